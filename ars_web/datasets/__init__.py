@@ -1,0 +1,1 @@
+"""Training sets out: samples, splits, shards, and one writer a format."""

@@ -1,0 +1,26 @@
+"""Pure geometry: no files, no clock, no globals.
+
+Frames
+    `T_world_camera` maps camera coordinates to the world; inner names meet:
+    `T_world_box = T_world_camera @ T_camera_box`. A transform is a (4, 4) float64 array, a batch
+    `Ts_world_camera` is (n, 4, 4). Metres and radians, right-handed. Camera axes are OpenCV's: x right,
+    y down, z forward. Quaternions are `wxyz`, of unit length, w >= 0.
+
+Points
+    Points carry their frame in their name: `corners_world`, `centre_camera`, `pixels`. Functions say
+    destination from source: `pixels_from_camera_points`.
+
+Boxes
+    A virtual box is `T_world_box`, origin at its centre, and `size` (3,) along its own axes, each > 0.
+
+Pixels
+    Inside `camera.py` a pixel's centre is at integers (OpenCV's, what `K` means). Everything that leaves
+    the geometry for a user, a file or the API is an image coordinate: (0, 0) is the image's top left corner
+    and (W, H) its bottom right; `camera.image_from_pixels` and `camera.pixels_from_image` convert, and nothing
+    else does. `labels.py` returns image coordinates.
+
+Labels
+    `bbox_amodal` is the whole object's box, unclipped; `bbox` is the box of the part of the object that lies
+    in the image. `truncated` is the share of the amodal outline's area outside the image; `visible` the share
+    of the in-image outline that no nearer object hides.
+"""
