@@ -50,7 +50,7 @@ class ExportOptions(_Strict):
     frames: FrameChoice = FrameChoice()  # pyright: ignore[reportCallIssue]
     images: Literal["link", "copy", "rectify", "none"] = Field(
         "link",
-        description="hard links where the file system allows and copies elsewhere; copies; undistorted copies; or no images",
+        description="hard links (copies across file systems), copies, undistorted copies, or no images",
     )
     shape: Literal["box", "hull", "mesh"] | None = Field(
         None, description="default: the hull where a box has one, else the box"

@@ -21,7 +21,7 @@ class ReadOptions:
     within: Path | None = None
 
 
-def read_recording(path: Path, *, format: str = "auto", options: ReadOptions = ReadOptions()) -> Recording:  # noqa: A002, B008
+def read_recording(path: Path, *, format: str = "auto", options: ReadOptions = ReadOptions()) -> Recording:  # noqa: A002
     """Read the recording at `path` (a file or a folder).
 
     Raises:
