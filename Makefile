@@ -1,0 +1,36 @@
+# Each of these does all its own set-up: it needs only python3 (3.11 or later), make and this checkout.
+#   make demo     the generated recording, imported, boxed and exported
+#   make test     the tests
+#   make check    format, lint, types and who may import whom
+#   make format   let ruff put the format right
+
+PYTHON ?= python3
+BIN := .venv/bin
+PINNED := pyproject.toml setup.py constraints.txt .ci/environment
+
+.PHONY: demo test check format
+.DELETE_ON_ERROR:
+
+demo: .venv/runtime.stamp
+	$(BIN)/ars-web demo
+
+test: .venv/dev.stamp
+	ARS_WEB_CHROMIUM="$$(.ci/chromium)" && export ARS_WEB_CHROMIUM && $(BIN)/python -m pytest $(ARGS)
+
+check: .venv/dev.stamp
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/pyright
+	$(BIN)/lint-imports
+
+format: .venv/dev.stamp
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+.venv/runtime.stamp: $(PINNED)
+	@PYTHON="$(PYTHON)" .ci/environment runtime
+	@touch $@
+
+.venv/dev.stamp: $(PINNED)
+	@PYTHON="$(PYTHON)" .ci/environment dev
+	@touch .venv/runtime.stamp $@
