@@ -1,0 +1,182 @@
+"""Samples: the labels of a session's boxes in its frames, and which of them an export keeps.
+
+This is the only caller of the geometry for exports, previews and the API's labels, so what is drawn, answered and
+written comes from the same functions.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from ars_web.datasets.options import ExportOptions
+from ars_web.errors import BadInput, NotFound
+from ars_web.geometry import labels as geometry
+from ars_web.geometry.box import Box
+from ars_web.geometry.camera import Camera
+from ars_web.geometry.occlusion import visible_fractions
+from ars_web.sessions.model import SessionSnapshot
+
+DROP_REASONS = ("not_in_image", "area", "truncation", "visibility")
+"""Why a box of a frame has no label, in the order in which the rules are tried; the first that applies counts."""
+
+
+@dataclass(frozen=True, eq=False)
+class LabelTable:
+    """Labels of b boxes in n frames, a row a frame; image coordinates (x0, y0, x1, y1).
+
+    Attributes:
+        bbox: (n, b, 4) of the part in the image; NaN where no part is in it.
+        bbox_amodal: (n, b, 4) of the whole object, unclipped; NaN where nothing is in front of the camera.
+        truncated: (n, b) share of the amodal outline outside the image; 1 where bbox is NaN.
+        visible: (n, b) share of the in-image outline that no nearer box hides; NaN where bbox is NaN or where it
+            was not asked for.
+    """
+
+    bbox: Float[np.ndarray, "n b 4"]
+    bbox_amodal: Float[np.ndarray, "n b 4"]
+    truncated: Float[np.ndarray, "n b"]
+    visible: Float[np.ndarray, "n b"]
+
+
+@dataclass(frozen=True, eq=False)
+class FrameLabel:
+    """One box in one frame, as the API answers it; image coordinates.
+
+    Attributes:
+        bbox: None where no part of the box is in the image.
+        bbox_amodal: None where no part of the box is in front of the camera.
+        outline: (k, 2) ring of the part in the image, not closed.
+        wireframe: polylines (k, 2) of the box's edges within the image.
+        truncated: 1 where bbox is None.
+        visible: 0 where bbox is None.
+    """
+
+    box_id: int
+    class_id: int
+    bbox: tuple[float, float, float, float] | None
+    bbox_amodal: tuple[float, float, float, float] | None
+    outline: Float[np.ndarray, "k 2"]
+    wireframe: list[Float[np.ndarray, "k 2"]]
+    truncated: float
+    visible: float
+
+
+def labels_in_frames(
+    cameras: Mapping[int, Camera],
+    camera_ids: Int[np.ndarray, "n"],
+    Ts_world_camera: Float[np.ndarray, "n 4 4"],
+    boxes: Sequence[Box],
+    *,
+    with_visible: bool = True,
+    step: int = 8,
+) -> LabelTable:
+    """Labels of every box in every frame; frames are taken together camera by camera.
+
+    `with_visible` False spares the search for nearer boxes; `step` is its grid in pixels.
+    """
+    n, b = len(camera_ids), len(boxes)
+    table = LabelTable(np.full((n, b, 4), np.nan), np.full((n, b, 4), np.nan), np.ones((n, b)), np.full((n, b), np.nan))
+    if b == 0:
+        return table
+    for camera, rows in _by_camera(cameras, camera_ids):
+        Ts, listed = Ts_world_camera[rows], list(boxes)
+        found = geometry.labels_of_boxes(camera, Ts, listed)
+        table.bbox[rows] = found.bbox
+        table.bbox_amodal[rows] = found.bbox_amodal
+        table.truncated[rows] = found.truncated
+        if with_visible:
+            table.visible[rows] = visible_fractions(camera, Ts, listed, found.bbox, step=step)
+    return table
+
+
+def label_table(snapshot: SessionSnapshot, indices: Sequence[int], *, step: int = 8) -> LabelTable:
+    """Labels of all boxes of a session, by ascending box id, in the frames at `indices`, in that order."""
+    rows = np.asarray(indices, dtype=np.int64)
+    frames = snapshot.frames
+    return labels_in_frames(
+        snapshot.cameras,
+        frames.camera_ids[rows],
+        frames.Ts_world_camera[rows],
+        [snapshot.state.boxes[i].box for i in sorted(snapshot.state.boxes)],
+        step=step,
+    )
+
+
+def kept(table: LabelTable, options: ExportOptions) -> tuple[Bool[np.ndarray, "n b"], dict[str, int]]:
+    """Which labels (n, b) the options keep, and how many were dropped for each of DROP_REASONS."""
+    in_image = ~np.isnan(table.bbox[..., 0])
+    with np.errstate(invalid="ignore"):
+        width = table.bbox[..., 2] - table.bbox[..., 0]
+        height = table.bbox[..., 3] - table.bbox[..., 1]
+        failed = (
+            ~in_image,
+            (width * height < options.min_area_px) | (width <= 0) | (height <= 0),
+            table.truncated > options.max_truncated,
+            table.visible < options.min_visible,
+        )
+    keep = np.ones(in_image.shape, dtype=bool)
+    dropped: dict[str, int] = {}
+    for reason, fails in zip(DROP_REASONS, failed, strict=True):
+        dropped[reason] = int((keep & fails).sum())
+        keep &= ~fails
+    return keep, dropped
+
+
+def frame_labels(snapshot: SessionSnapshot, index: int, *, shape: str | None = None) -> list[FrameLabel]:
+    """Labels of all boxes of a session in frame `index`, by ascending box id, those out of sight included.
+
+    `shape` is the export option of that name: boxes have no stored hull yet, so `hull` falls back to the box.
+
+    Raises:
+        NotFound: the session has no such frame.
+        BadInput: `shape` is `mesh`, or no shape at all.
+    """
+    check_shape(shape)
+    frames = snapshot.frames
+    if not 0 <= index < len(frames):
+        raise NotFound(f"session {snapshot.id} has no frame {index}; its frames are 0 to {len(frames) - 1}")
+    camera = snapshot.cameras[int(frames.camera_ids[index])]
+    T_world_camera = frames.Ts_world_camera[index]
+    table = label_table(snapshot, [index])
+    found: list[FrameLabel] = []
+    for column, box_id in enumerate(sorted(snapshot.state.boxes)):
+        virtual = snapshot.state.boxes[box_id]
+        bbox = _bbox_or_none(table.bbox[0, column])
+        found.append(
+            FrameLabel(
+                box_id=box_id,
+                class_id=virtual.class_id,
+                bbox=bbox,
+                bbox_amodal=_bbox_or_none(table.bbox_amodal[0, column]),
+                outline=geometry.outline(camera, T_world_camera, virtual.box) if bbox else np.zeros((0, 2)),
+                wireframe=geometry.wireframe(camera, T_world_camera, virtual.box) if bbox else [],
+                truncated=float(table.truncated[0, column]),
+                visible=float(table.visible[0, column]) if bbox else 0.0,
+            )
+        )
+    return found
+
+
+def check_shape(shape: str | None) -> None:
+    """Raises BadInput for a label shape that cannot be made."""
+    if shape == "mesh":
+        raise BadInput("shape 'mesh' needs a mesh for each class and this session has none; use 'box' or 'hull'")
+    if shape not in (None, "box", "hull"):
+        raise BadInput(f"shape {shape!r} is unknown; known are box, hull and mesh")
+
+
+def _by_camera(
+    cameras: Mapping[int, Camera], camera_ids: Int[np.ndarray, "n"]
+) -> Iterator[tuple[Camera, Int[np.ndarray, "m"]]]:
+    """Each camera that occurs, with the rows of its frames."""
+    for camera_id in np.unique(camera_ids).tolist():
+        yield cameras[camera_id], np.flatnonzero(camera_ids == camera_id)
+
+
+def _bbox_or_none(bbox: Float[np.ndarray, "4"]) -> tuple[float, float, float, float] | None:
+    if np.isnan(bbox[0]):
+        return None
+    x0, y0, x1, y1 = bbox.tolist()
+    return x0, y0, x1, y1
