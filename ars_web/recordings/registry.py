@@ -1,31 +1,70 @@
 """The readers by format, and finding a recording's format by looking at what is there."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from ars_web.errors import BadFile, BadInput
+from ars_web.recordings import ars
+from ars_web.recordings.options import NOTHING_SAID, ReadOptions
 from ars_web.recordings.recording import Recording
+
+__all__ = ["READERS", "ReadOptions", "Reader", "detect_formats", "read_recording"]
 
 
 @dataclass(frozen=True)
-class ReadOptions:
-    """What a caller may say about a recording that its files do not.
+class Reader:
+    """One format.
 
     Attributes:
-        images: the image folder, where it is not the one the format implies.
-        camera: a camera file (`w h fx fy cx cy k1 k2 p1 p2`), for formats without one of their own.
-        within: images outside this folder are refused (None: anywhere). Doors that serve strangers set it.
+        format: its key.
+        title: what it is called, and which files it needs.
+        recognises: whether a path that exists looks like it; raises nothing.
+        read: reads it, whole and sound, or raises.
     """
 
-    images: Path | None = None
-    camera: Path | None = None
-    within: Path | None = None
+    format: str
+    title: str
+    recognises: Callable[[Path], bool]
+    read: Callable[[Path, ReadOptions], Recording]
 
 
-def read_recording(path: Path, *, format: str = "auto", options: ReadOptions = ReadOptions()) -> Recording:  # noqa: A002
+READERS: dict[str, Reader] = {
+    "ars": Reader("ars", ars.TITLE, ars.recognises, ars.read),
+}
+
+
+def detect_formats(path: Path) -> list[str]:
+    """The formats that the file or folder at `path` looks like; none, one or several."""
+    return [key for key, reader in READERS.items() if reader.recognises(path)]
+
+
+def read_recording(path: Path, *, format: str = "auto", options: ReadOptions = NOTHING_SAID) -> Recording:  # noqa: A002
     """Read the recording at `path` (a file or a folder).
 
     Raises:
         BadInput: no reader knows it, or several do (the message names the candidates and what to do).
         BadFile: it is damaged; the message names file and line.
+        RefusedPath: something of it lies outside `options.within`.
     """
-    raise NotImplementedError
+    if format != "auto" and format not in READERS:
+        raise BadInput(f"format {format!r} is unknown; known are auto, {', '.join(READERS)}")
+    options.allowed(path)
+    if not path.exists():
+        raise BadFile(path, "is missing")
+    if format == "auto":
+        format = _only_format(path)  # noqa: A001
+    return READERS[format].read(path, options)
+
+
+def _only_format(path: Path) -> str:
+    found = detect_formats(path)
+    if not found:
+        known = "; ".join(f"{key}: {reader.title}" for key, reader in READERS.items())
+        raise BadInput(f"{path} is no recording that is known. Known are: {known}")
+    if len(found) > 1:
+        raise BadInput(
+            f"{path} could be {' or '.join(found)}; say which with the format ({', '.join(found)}), or give the"
+            " recording's own file or folder instead"
+        )
+    return found[0]

@@ -1,0 +1,47 @@
+"""Images: their size without decoding, and their pixels exactly as they are stored."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+from jaxtyping import UInt8
+
+from ars_web.errors import BadFile
+from ars_web.recordings.image_header import MAX_IMAGE_PIXELS, read_header
+
+__all__ = ["MAX_IMAGE_PIXELS", "image_size", "read_image"]
+
+
+def image_size(path: Path) -> tuple[int, int]:
+    """Width and height in pixels as stored, from the header alone; Exif's rotation is not applied.
+
+    Raises:
+        BadFile: it is missing, not to be read, neither PNG nor JPEG, or its header is damaged.
+        TooLarge: it has more than MAX_IMAGE_PIXELS.
+    """
+    header = read_header(path)
+    return header.width, header.height
+
+
+def read_image(path: Path) -> UInt8[np.ndarray, "h w 3"]:
+    """The pixels (h, w, 3) in BGR, as stored: Exif's rotation is not applied, since calibrations do not know it.
+
+    Raises:
+        BadFile: it is missing, not to be read, neither PNG nor JPEG, truncated or damaged.
+        TooLarge: it has more than MAX_IMAGE_PIXELS.
+    """
+    header = read_header(path)
+    if not header.whole:
+        raise BadFile(path, "the image ends before its data does (truncated)")
+    try:
+        data = np.fromfile(path, dtype=np.uint8)
+        image = cv2.imdecode(data, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+    except (OSError, cv2.error) as error:
+        raise BadFile(path, f"the image cannot be decoded: {error}") from error
+    if image is None:
+        raise BadFile(path, "the image cannot be decoded (damaged)")
+    if image.shape[:2] != (header.height, header.width):
+        raise BadFile(
+            path, f"the image decodes to {image.shape[1]} x {image.shape[0]} pixels, not to its header's size"
+        )
+    return image

@@ -1,0 +1,36 @@
+"""What a caller may say about a recording that its files do not."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from ars_web.errors import RefusedPath
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """What a caller may say about a recording that its files do not.
+
+    Attributes:
+        images: the image folder, where it is not the one the format implies.
+        camera: a camera file (`w h fx fy cx cy k1 k2 p1 p2`), for formats without one of their own.
+        within: files and images outside this folder are refused, links followed (None: anywhere). Doors that serve
+            strangers set it. `images` and `camera` are held to it too.
+    """
+
+    images: Path | None = None
+    camera: Path | None = None
+    within: Path | None = None
+
+    def allowed(self, path: Path) -> Path:
+        """`path` itself, where it may be read.
+
+        Raises:
+            RefusedPath: it lies outside `within` once its links are followed.
+        """
+        if self.within is not None and not path.resolve().is_relative_to(self.within.resolve()):
+            raise RefusedPath(f"{path} leads outside {self.within}, and nothing outside it is read")
+        return path
+
+
+NOTHING_SAID = ReadOptions()
+"""The options of a caller who leaves all to the files."""
