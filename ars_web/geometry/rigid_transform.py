@@ -16,6 +16,10 @@ ROTATION_TOLERANCE = 1e-3
 Files hold six to nine digits; a scaled or sheared matrix is off by far more."""
 
 
+ROUNDING = 1e-14
+"""R^T R of a rotation that is as exact as float64 can hold is off the identity by less."""
+
+
 def from_rotation(rotation: Float[np.ndarray, "*batch 3 3"], translation: Float[np.ndarray, "*batch 3"]) -> Transforms:
     """Transforms from rotation matrices (..., 3, 3) and translations (..., 3), which must broadcast."""
     batch = np.broadcast_shapes(rotation.shape[:-2], translation.shape[:-1])
@@ -128,4 +132,5 @@ def checked(T: Float[np.ndarray, "4 4"]) -> Transform:
         raise BadInput(f"not a rotation: R^T R is off the identity by {error:.3g} (is there a scale in it?)")
     if np.linalg.det(R) < 0:
         raise BadInput("not a rotation but a reflection: its determinant is -1 (is an axis mirrored?)")
-    return from_rotation(nearest_rotation(R), T[:3, 3])
+    # What is exact already stays as it is, bit by bit: a box that is stored and read again is the same box.
+    return from_rotation(R if error < ROUNDING else nearest_rotation(R), T[:3, 3])

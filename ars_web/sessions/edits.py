@@ -4,10 +4,15 @@ An `Edit` is a list of changes, each holding what it found and what it left. So 
 appends an inverse edit, and an edit that no longer finds what it expects is a conflict, never a silent loss.
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from datetime import datetime
+from typing import TypeVar
 
-from ars_web.sessions.model import ObjectClass, VirtualBox
+import numpy as np
+
+from ars_web.errors import Conflict
+from ars_web.sessions.model import ObjectClass, SessionState, VirtualBox
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +52,7 @@ class Edit:
         revision: the session's revision after it, gap-free from 1.
         author: who, as the door that took it in calls them (`local`, `cli`, a page's user); undo is each author's own.
         summary: one line for the history, such as `Move cube`.
-        changes: applied together or not at all.
+        changes: applied together or not at all; no box and no class occurs twice in them.
         undoes: the revision whose edit this one inverts, for undo; None otherwise.
         redoes: the revision of the undo that this one inverts, for redo; None otherwise.
         at: UTC.
@@ -60,3 +65,144 @@ class Edit:
     undoes: int | None
     redoes: int | None
     at: datetime
+
+
+Thing = VirtualBox | ObjectClass
+T = TypeVar("T", VirtualBox, ObjectClass)
+
+
+def same_content(a: Thing | None, b: Thing | None) -> bool:
+    """Whether two boxes, or two classes, are alike in everything but the revision that made them so."""
+    if isinstance(a, ObjectClass) and isinstance(b, ObjectClass):
+        return (a.id, a.name, a.color) == (b.id, b.name, b.color)
+    if isinstance(a, VirtualBox) and isinstance(b, VirtualBox):
+        return (
+            (a.id, a.class_id, a.name, a.has_hull) == (b.id, b.class_id, b.name, b.has_hull)
+            and np.array_equal(a.box.T_world_box, b.box.T_world_box)
+            and np.array_equal(a.box.size, b.box.size)
+        )
+    return a is None and b is None
+
+
+def same(a: Thing | None, b: Thing | None) -> bool:
+    """Whether two boxes, or two classes, are alike, their revisions included."""
+    return same_content(a, b) and (a is None or b is None or a.revision == b.revision)
+
+
+def inverse(changes: Iterable[Change]) -> tuple[Change, ...]:
+    """The changes that take back `changes`: last first, each from what it left to what it found."""
+    return tuple(replace(change, before=change.after, after=change.before) for change in reversed(tuple(changes)))
+
+
+def restated(changes: Sequence[Change], state: SessionState, *, revision: int) -> tuple[Change, ...]:
+    """`changes` as they read when made to `state` now, to make `revision`.
+
+    What they expect to find must be there; only who last touched it, its revision, may differ.
+
+    Raises:
+        Conflict: a box, a class or the name is not what the changes expect; `current` is what it is.
+    """
+    out: list[Change] = []
+    for change in changes:
+        if isinstance(change, NameChange):
+            _expect_name(change, state.name)
+            out.append(change)
+        elif isinstance(change, BoxChange):
+            found = state.boxes.get(change.box_id)
+            if not same_content(found, change.before):
+                raise Conflict(_moved_on(change, found), current=found)
+            out.append(BoxChange(change.box_id, found, _at(change.after, revision)))
+        else:
+            found = state.classes.get(change.class_id)
+            if not same_content(found, change.before):
+                raise Conflict(_moved_on(change, found), current=found)
+            out.append(ClassChange(change.class_id, found, _at(change.after, revision)))
+    return tuple(out)
+
+
+def _at(thing: T | None, revision: int) -> T | None:
+    return None if thing is None else replace(thing, revision=revision)
+
+
+def apply(state: SessionState, edit: Edit) -> SessionState:
+    """The state after `edit`.
+
+    Raises:
+        Conflict: the edit is not the next one, does not find what it expects, or would leave a box without its
+            class or two classes of one name. `state` is untouched.
+    """
+    if edit.revision != state.revision + 1:
+        raise Conflict(f"edit {edit.revision} cannot follow revision {state.revision}")
+    classes, boxes, name = dict(state.classes), dict(state.boxes), state.name
+    for change in edit.changes:
+        if isinstance(change, NameChange):
+            _expect_name(change, name)
+            name = change.after
+        elif isinstance(change, BoxChange):
+            _put(boxes, change.box_id, change.before, change.after, edit.revision, change)
+        else:
+            _put(classes, change.class_id, change.before, change.after, edit.revision, change)
+    _refuse_broken_links(edit.changes, classes, boxes)
+    return SessionState(
+        revision=edit.revision,
+        name=name,
+        classes=dict(sorted(classes.items())),
+        boxes=dict(sorted(boxes.items())),
+        # An id that was given once stays given, also when undo has taken its box away.
+        next_class_id=max(
+            state.next_class_id, *(c.class_id + 1 for c in edit.changes if isinstance(c, ClassChange)), 0
+        ),
+        next_box_id=max(state.next_box_id, *(c.box_id + 1 for c in edit.changes if isinstance(c, BoxChange)), 0),
+    )
+
+
+def _put(
+    things: dict[int, T], id_: int, before: T | None, after: T | None, revision: int, change: BoxChange | ClassChange
+) -> None:
+    found = things.get(id_)
+    if not same(found, before):
+        raise Conflict(_moved_on(change, found), current=found)
+    if after is None:
+        things.pop(id_, None)
+        return
+    if after.id != id_ or after.revision != revision:
+        raise Conflict(f"edit {revision} leaves {after.name!r} with id {after.id} and revision {after.revision}")
+    things[id_] = after
+
+
+def _refuse_broken_links(
+    changes: Iterable[Change], classes: dict[int, ObjectClass], boxes: dict[int, VirtualBox]
+) -> None:
+    gone: dict[int, str] = {}
+    named: set[str] = set()
+    for change in changes:
+        if isinstance(change, BoxChange) and change.after is not None and change.after.class_id not in classes:
+            raise Conflict(f"box {change.after.name!r} needs class {change.after.class_id}, which is gone")
+        if isinstance(change, ClassChange) and change.before is not None and change.after is None:
+            gone[change.class_id] = change.before.name
+        if isinstance(change, ClassChange) and change.after is not None:
+            named.add(change.after.name)
+    if gone:
+        for box in boxes.values():
+            if box.class_id in gone:
+                raise Conflict(f"box {box.name!r} uses class {gone[box.class_id]!r}: delete the box first", current=box)
+    if named:
+        seen: set[str] = set()
+        for a_class in classes.values():
+            if a_class.name in seen:
+                raise Conflict(f"there is another class called {a_class.name!r}", current=a_class)
+            seen.add(a_class.name)
+
+
+def _expect_name(change: NameChange, name: str) -> None:
+    if name != change.before:
+        raise Conflict(f"the session was renamed to {name!r} meanwhile", current=name)
+
+
+def _moved_on(change: BoxChange | ClassChange, found: Thing | None) -> str:
+    kind, id_ = ("box", change.box_id) if isinstance(change, BoxChange) else ("class", change.class_id)
+    known = found or change.before or change.after
+    what = f"{kind} {id_} ({known.name!r})" if known else f"{kind} {id_}"
+    if found is None:
+        return f"{what} was deleted meanwhile"
+    return f"{what} was changed meanwhile, in revision {found.revision}"

@@ -1,0 +1,137 @@
+"""Edits, classes and boxes as the JSON that the log keeps. Every float comes back bit by bit."""
+
+from datetime import UTC, datetime
+from typing import Any, cast
+
+import numpy as np
+import orjson
+
+from ars_web.errors import ArsError, StoreError
+from ars_web.geometry import rigid_transform
+from ars_web.geometry.box import Box
+from ars_web.sessions.edits import BoxChange, Change, ClassChange, NameChange
+from ars_web.sessions.model import ObjectClass, SessionState, VirtualBox
+
+Json = dict[str, Any]
+
+
+def changes_json(changes: tuple[Change, ...]) -> str:
+    """The changes of one edit as a JSON list."""
+    return orjson.dumps([_change_json(change) for change in changes]).decode()
+
+
+def changes_from_json(text: str) -> tuple[Change, ...]:
+    """The changes that `changes_json` wrote.
+
+    Raises:
+        StoreError: the text is not such a list.
+    """
+    try:
+        return tuple(_change(item) for item in orjson.loads(text))
+    except (ValueError, KeyError, TypeError, ArsError) as error:
+        raise StoreError(f"an entry of the session's log cannot be read: {error}") from error
+
+
+def state_json(state: SessionState) -> str:
+    """A whole state as a JSON object: what the log of a session starts from."""
+    return orjson.dumps(
+        {
+            "revision": state.revision,
+            "name": state.name,
+            "classes": [_class_json(a_class) for a_class in state.classes.values()],
+            "boxes": [_box_json(box) for box in state.boxes.values()],
+            "next_class_id": state.next_class_id,
+            "next_box_id": state.next_box_id,
+        }
+    ).decode()
+
+
+def state_from_json(text: str) -> SessionState:
+    """The state that `state_json` wrote.
+
+    Raises:
+        StoreError: the text is not such an object.
+    """
+    try:
+        item = cast(Json, orjson.loads(text))
+        return SessionState(
+            revision=item["revision"],
+            name=item["name"],
+            classes={c["id"]: _class(c) for c in item["classes"]},
+            boxes={b["id"]: _box(b) for b in item["boxes"]},
+            next_class_id=item["next_class_id"],
+            next_box_id=item["next_box_id"],
+        )
+    except (ValueError, KeyError, TypeError, ArsError) as error:
+        raise StoreError(f"the state that the session's log starts from cannot be read: {error}") from error
+
+
+def utc_text(at: datetime) -> str:
+    """A moment as ISO 8601 in UTC, to the microsecond; such texts sort as the moments do."""
+    return at.astimezone(UTC).isoformat(timespec="microseconds")
+
+
+def utc_from_text(text: str) -> datetime:
+    """The moment that `utc_text` wrote."""
+    return datetime.fromisoformat(text)
+
+
+def _change_json(change: Change) -> Json:
+    if isinstance(change, NameChange):
+        return {"name": None, "before": change.before, "after": change.after}
+    if isinstance(change, BoxChange):
+        return {
+            "box": change.box_id,
+            "before": None if change.before is None else _box_json(change.before),
+            "after": None if change.after is None else _box_json(change.after),
+        }
+    return {
+        "class": change.class_id,
+        "before": None if change.before is None else _class_json(change.before),
+        "after": None if change.after is None else _class_json(change.after),
+    }
+
+
+def _change(item: Json) -> Change:
+    before, after = item["before"], item["after"]
+    if "box" in item:
+        return BoxChange(item["box"], None if before is None else _box(before), None if after is None else _box(after))
+    if "class" in item:
+        return ClassChange(
+            item["class"], None if before is None else _class(before), None if after is None else _class(after)
+        )
+    return NameChange(before, after)
+
+
+def _class_json(a_class: ObjectClass) -> Json:
+    return {"id": a_class.id, "name": a_class.name, "color": a_class.color, "revision": a_class.revision}
+
+
+def _class(item: Json) -> ObjectClass:
+    return ObjectClass(item["id"], item["name"], item["color"], item["revision"])
+
+
+def _box_json(box: VirtualBox) -> Json:
+    return {
+        "id": box.id,
+        "class_id": box.class_id,
+        "name": box.name,
+        # The matrix, not a quaternion: converting there and back would move the box by a rounding error.
+        "rotation": box.box.T_world_box[:3, :3].ravel().tolist(),
+        "position": box.box.T_world_box[:3, 3].tolist(),
+        "size": box.box.size.tolist(),
+        "has_hull": box.has_hull,
+        "revision": box.revision,
+    }
+
+
+def _box(item: Json) -> VirtualBox:
+    T = rigid_transform.from_rotation(np.array(item["rotation"]).reshape(3, 3), np.array(item["position"]))
+    return VirtualBox(
+        id=item["id"],
+        class_id=item["class_id"],
+        name=item["name"],
+        box=Box(T, np.array(item["size"])),
+        has_hull=item["has_hull"],
+        revision=item["revision"],
+    )

@@ -1,0 +1,247 @@
+"""The one door for change: appends an edit to the log, applies it and tells listeners, in that order.
+
+Appending and applying are one transaction, and listeners are told once it is on the disk. Nothing else writes to a
+session. A change that would leave everything as it is makes no edit and no revision.
+"""
+
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from datetime import UTC, datetime
+
+import numpy as np
+
+from ars_web.errors import BadInput, Conflict
+from ars_web.geometry.box import Box
+from ars_web.geometry.rigid_transform import Transform
+from ars_web.sessions.drafting import (
+    BoxDraft,
+    box_at,
+    change_summary,
+    changed_box,
+    class_at,
+    drafted,
+    free_class_name,
+)
+from ars_web.sessions.edits import BoxChange, Change, ClassChange, Edit, NameChange, inverse, restated
+from ars_web.sessions.history import to_redo, to_undo
+from ars_web.sessions.listeners import Listener, Listeners
+from ars_web.sessions.model import ObjectClass, SessionSummary, VirtualBox
+from ars_web.sessions.names import checked_name
+from ars_web.sessions.palette import checked_color, next_color
+from ars_web.sessions.store import SessionStore
+from ars_web.sessions.transaction import SessionTransaction
+
+__all__ = ["BoxDraft", "NothingToUndo", "SessionEditor"]
+
+
+class NothingToUndo(BadInput):
+    """The author has no edit to take back, or none to make again."""
+
+
+class SessionEditor:
+    """Changes sessions, for any number of threads; other processes may change the same sessions meanwhile.
+
+    Every method raises NotFound for an unknown session and StoreError where the edit cannot be kept. Methods with
+    `expected_revision` raise Conflict where the thing is no longer at that revision; `current` is what it is now.
+    """
+
+    def __init__(self, store: SessionStore) -> None:
+        self._store = store
+        self._listeners = Listeners()
+
+    def listen(self, callback: Listener) -> Callable[[], None]:
+        """Call `callback(sid, edit)` after each edit made through this editor, in the order of revisions.
+
+        It is called by a thread that edits, and should be quick. Edits of other processes are not told; the log
+        has them (`SessionStore.edits`). Returns the way to stop.
+        """
+        return self._listeners.add(callback)
+
+    def add_box(
+        self, sid: str, *, class_id: int, box: Box, name: str | None = None, author: str, key: str | None = None
+    ) -> VirtualBox:
+        """A new box, called after its class unless `name` says otherwise."""
+        return self._add_boxes(sid, [BoxDraft(class_id, box, name)], author=author, summary=None)[0]
+
+    def add_boxes(
+        self, sid: str, drafts: Sequence[BoxDraft], *, author: str, summary: str = "Import boxes"
+    ) -> list[VirtualBox]:
+        """Several boxes in one edit, which one undo takes back; none at all if one of them cannot be added."""
+        return self._add_boxes(sid, drafts, author=author, summary=summary)
+
+    def _add_boxes(self, sid: str, drafts: Sequence[BoxDraft], *, author: str, summary: str | None) -> list[VirtualBox]:
+        with self._editing(sid) as session:
+            boxes = drafted(session.state, drafts)
+            if boxes:
+                changes = tuple(BoxChange(box.id, None, box) for box in boxes)
+                self._append(session, changes, author=author, summary=summary or f"Add {boxes[0].name}")
+        return boxes
+
+    def change_box(
+        self,
+        sid: str,
+        box_id: int,
+        *,
+        expected_revision: int,
+        class_id: int | None = None,
+        T_world_box: Transform | None = None,
+        size: np.ndarray | None = None,
+        name: str | None = None,
+        author: str,
+    ) -> VirtualBox:
+        """Change what is given of a box and leave the rest. Nothing new given: the box as it is."""
+        with self._editing(sid) as session:
+            before = box_at(session.state, box_id, expected_revision)
+            after = changed_box(session.state, before, class_id=class_id, T_world_box=T_world_box, size=size, name=name)
+            if after is before:
+                return before
+            self._append(
+                session, (BoxChange(box_id, before, after),), author=author, summary=change_summary(before, after)
+            )
+        return after
+
+    def delete_box(self, sid: str, box_id: int, *, expected_revision: int, author: str) -> None:
+        """Take a box away; undo brings it back with the same id."""
+        with self._editing(sid) as session:
+            before = box_at(session.state, box_id, expected_revision)
+            self._append(session, (BoxChange(box_id, before, None),), author=author, summary=f"Delete {before.name}")
+
+    def add_class(
+        self, sid: str, *, name: str, color: str | None = None, author: str, key: str | None = None
+    ) -> ObjectClass:
+        """A new class, in the next colour of the palette unless `color` says otherwise."""
+        with self._editing(sid) as session:
+            state = session.state
+            added = ObjectClass(
+                id=state.next_class_id,
+                name=free_class_name(state, name),
+                color=next_color(c.color for c in state.classes.values()) if color is None else checked_color(color),
+                revision=state.revision + 1,
+            )
+            change = ClassChange(added.id, None, added)
+            self._append(session, (change,), author=author, summary=f"Add class {added.name}")
+        return added
+
+    def change_class(
+        self,
+        sid: str,
+        class_id: int,
+        *,
+        expected_revision: int,
+        name: str | None = None,
+        color: str | None = None,
+        author: str,
+    ) -> ObjectClass:
+        """Change a class's name or colour. Nothing new given: the class as it is."""
+        with self._editing(sid) as session:
+            before = class_at(session.state, class_id, expected_revision)
+            after = replace(
+                before,
+                name=before.name if name is None else free_class_name(session.state, name, own_id=class_id),
+                color=before.color if color is None else checked_color(color),
+            )
+            if after == before:
+                return before
+            after = replace(after, revision=session.state.revision + 1)
+            change = ClassChange(class_id, before, after)
+            self._append(session, (change,), author=author, summary=f"Change class {before.name}")
+        return after
+
+    def delete_class(self, sid: str, class_id: int, *, expected_revision: int, author: str) -> None:
+        """Take a class away.
+
+        Raises:
+            BadInput: boxes use it.
+        """
+        with self._editing(sid) as session:
+            before = class_at(session.state, class_id, expected_revision)
+            users = [box.name for box in session.state.boxes.values() if box.class_id == class_id]
+            if users:
+                raise BadInput(
+                    f"class {before.name!r} is used by {len(users)} boxes ({', '.join(users[:5])}…);"
+                    " delete them or give them another class first"
+                )
+            change = ClassChange(class_id, before, None)
+            self._append(session, (change,), author=author, summary=f"Delete class {before.name}")
+
+    def rename(self, sid: str, *, name: str, expected_revision: int, author: str) -> SessionSummary:
+        """Rename the session, which must be at `expected_revision`."""
+        with self._editing(sid) as session:
+            state, name = session.state, checked_name(name, what="a session")
+            if state.revision != expected_revision:
+                raise Conflict(
+                    f"the session is at revision {state.revision}, not {expected_revision}", current=session.summary()
+                )
+            if name != state.name:
+                change = NameChange(state.name, name)
+                self._append(session, (change,), author=author, summary=f"Rename the session to {name}")
+            summary = session.summary()
+        return summary
+
+    def undo(self, sid: str, *, author: str) -> Edit:
+        """Take back the author's newest edit that stands, by an edit that inverts it.
+
+        Raises:
+            NothingToUndo: there is none.
+            Conflict: someone else changed the same thing since; nothing is changed.
+        """
+        with self._editing(sid) as session:
+            revision = to_undo(session.newest_entries(author=author))
+            if revision is None:
+                raise NothingToUndo(f"{author!r} has nothing to undo in this session")
+            edit = self._invert(session, session.edit(revision), author=author, verb="Undo")
+        return edit
+
+    def redo(self, sid: str, *, author: str) -> Edit:
+        """Make again what the author's newest undo took back, unless something new was done since.
+
+        Raises:
+            NothingToUndo: there is no such undo.
+            Conflict: someone else changed the same thing since; nothing is changed.
+        """
+        with self._editing(sid) as session:
+            revision = to_redo(session.newest_entries(author=author))
+            if revision is None:
+                raise NothingToUndo(f"{author!r} has nothing to redo in this session")
+            edit = self._invert(session, session.edit(revision), author=author, verb="Redo")
+        return edit
+
+    @contextmanager
+    def _editing(self, sid: str) -> Generator[SessionTransaction]:
+        with self._store.writing(sid, committed=lambda edits: self._listeners.put(sid, edits)) as session:
+            yield session
+        self._listeners.tell()
+
+    def _invert(self, session: SessionTransaction, edit: Edit, *, author: str, verb: str) -> Edit:
+        changes = restated(inverse(edit.changes), session.state, revision=session.state.revision + 1)
+        return self._append(
+            session,
+            changes,
+            author=author,
+            summary=f"{verb}: {edit.summary.removeprefix('Undo: ').removeprefix('Redo: ')}",
+            undoes=edit.revision if verb == "Undo" else None,
+            redoes=edit.revision if verb == "Redo" else None,
+        )
+
+    def _append(
+        self,
+        session: SessionTransaction,
+        changes: tuple[Change, ...],
+        *,
+        author: str,
+        summary: str,
+        undoes: int | None = None,
+        redoes: int | None = None,
+    ) -> Edit:
+        edit = Edit(
+            revision=session.state.revision + 1,
+            author=checked_name(author, what="an author"),
+            summary=summary,
+            changes=changes,
+            undoes=undoes,
+            redoes=redoes,
+            at=datetime.now(UTC),
+        )
+        session.append(edit)
+        return edit

@@ -1,0 +1,1 @@
+"""One script a step, numbered; once released a step is never changed."""

@@ -1,0 +1,56 @@
+"""What names of sessions, classes, boxes, authors and images may be."""
+
+import unicodedata
+from collections.abc import Iterable
+from pathlib import PurePosixPath
+
+from ars_web.errors import BadInput, RefusedPath
+
+LONGEST_NAME = 100
+"""Characters."""
+
+
+def checked_name(name: str, *, what: str) -> str:
+    """`name` without blanks around it; `what` says whose name it is, such as `a class`.
+
+    Raises:
+        BadInput: nothing is left, it is longer than LONGEST_NAME, or it holds a control character or half a
+            surrogate pair, which no file could hold.
+    """
+    name = name.strip()
+    if not name:
+        raise BadInput(f"{what} needs a name that is not empty")
+    if len(name) > LONGEST_NAME:
+        raise BadInput(f"{what}'s name has at most {LONGEST_NAME} characters, not {len(name)}: {name[:40]!r}…")
+    if _unprintable(name):
+        raise BadInput(f"{what}'s name cannot hold a control character: {name!r}")
+    return name
+
+
+def unused_name(base: str, taken: Iterable[str]) -> str:
+    """`base`, or `base 2`, `base 3`, … where it is taken; never longer than LONGEST_NAME."""
+    taken = set(taken)
+    if base not in taken:
+        return base
+    number = 2
+    while True:
+        name = f"{base[: LONGEST_NAME - len(f' {number}')]} {number}"
+        if name not in taken:
+            return name
+        number += 1
+
+
+def checked_image_name(name: str) -> str:
+    """`name`, which must be a path relative to an image folder, with `/`, that stays in it.
+
+    Raises:
+        RefusedPath: it is absolute, has an empty part, `.` or `..`, or a character no file name should hold.
+    """
+    parts = name.split("/")
+    if any(part in ("", ".", "..") for part in parts) or _unprintable(name) or PurePosixPath(name).is_absolute():
+        raise RefusedPath(f"{name!r} cannot name an image: a relative path such as images/0001.jpg is needed")
+    return name
+
+
+def _unprintable(text: str) -> bool:
+    return any(unicodedata.category(character) in ("Cc", "Cs", "Zl", "Zp") for character in text)

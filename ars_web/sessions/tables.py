@@ -1,0 +1,109 @@
+"""The tables of one session's database. `migrations/` makes them; a test holds the two to each other.
+
+One database holds one session, so no table needs a session's id: a session folder can be moved or copied whole.
+"""
+
+from sqlalchemy import (
+    Boolean,
+    CheckConstraint,
+    Column,
+    Float,
+    ForeignKey,
+    Index,
+    Integer,
+    LargeBinary,
+    MetaData,
+    Table,
+    Text,
+    false,
+)
+
+metadata = MetaData()
+
+session = Table(
+    "session",
+    metadata,
+    Column("id", Integer, CheckConstraint("id = 1", name="one_session"), primary_key=True),
+    Column("name", Text, nullable=False),
+    Column("revision", Integer, nullable=False),
+    Column("next_class_id", Integer, nullable=False),
+    Column("next_box_id", Integer, nullable=False),
+    Column("format", Text, nullable=False),
+    Column("source", Text, nullable=False),
+    Column("created", Text, nullable=False),
+    Column("changed", Text, nullable=False),
+    # The state at revision 0, as JSON: what the log is replayed from.
+    Column("origin", Text, nullable=False),
+)
+
+camera = Table(
+    "camera",
+    metadata,
+    Column("id", Integer, primary_key=True),
+    Column("width", Integer, nullable=False),
+    Column("height", Integer, nullable=False),
+    Column("fx", Float, nullable=False),
+    Column("fy", Float, nullable=False),
+    Column("cx", Float, nullable=False),
+    Column("cy", Float, nullable=False),
+    Column("model", Text, nullable=False),
+    Column("distortion", Text, nullable=False),
+)
+
+frame = Table(
+    "frame",
+    metadata,
+    Column("idx", Integer, primary_key=True),
+    Column("name", Text, nullable=False, unique=True),
+    # The absolute path of an image that lies elsewhere; NULL: `images/NAME` in the session's own folder.
+    Column("image", Text),
+    Column("camera_id", Integer, ForeignKey("camera.id"), nullable=False),
+    # The upper three rows of T_world_camera, little-endian float64, row by row.
+    Column("pose", LargeBinary, nullable=False),
+)
+
+skipped = Table(
+    "skipped",
+    metadata,
+    Column("idx", Integer, primary_key=True),
+    Column("name", Text, nullable=False),
+    Column("reason", Text, nullable=False),
+    Column("place", Text, nullable=False),
+)
+
+object_class = Table(
+    "object_class",
+    metadata,
+    Column("id", Integer, primary_key=True),
+    Column("name", Text, nullable=False, unique=True),
+    Column("color", Text, nullable=False),
+    Column("revision", Integer, nullable=False),
+)
+
+box = Table(
+    "box",
+    metadata,
+    Column("id", Integer, primary_key=True),
+    Column("class_id", Integer, ForeignKey("object_class.id"), nullable=False),
+    Column("name", Text, nullable=False),
+    # As `frame.pose`, of T_world_box.
+    Column("pose", LargeBinary, nullable=False),
+    Column("size_x", Float, nullable=False),
+    Column("size_y", Float, nullable=False),
+    Column("size_z", Float, nullable=False),
+    Column("has_hull", Boolean, nullable=False, server_default=false()),
+    Column("revision", Integer, nullable=False),
+)
+
+edit = Table(
+    "edit",
+    metadata,
+    Column("revision", Integer, primary_key=True),
+    Column("author", Text, nullable=False),
+    Column("summary", Text, nullable=False),
+    Column("changes", Text, nullable=False),
+    Column("undoes", Integer, ForeignKey("edit.revision")),
+    Column("redoes", Integer, ForeignKey("edit.revision")),
+    Column("at", Text, nullable=False),
+    Index("edit_by_author", "author", "revision"),
+)
