@@ -1,4 +1,4 @@
-"""What pyproject.toml cannot say: the page in `static/`, at the root of the checkout, is installed as `ars_web/static`."""
+"""What pyproject.toml cannot say: the page, `static/` at the checkout's root, is installed as `ars_web/static`."""
 
 from setuptools import find_namespace_packages, setup
 

@@ -1,0 +1,160 @@
+"""What the commands take: arguments and options with their help, and how their texts become values."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+if TYPE_CHECKING:
+    from ars_web.datasets.options import ExportOptions
+
+SESSIONS = Path("sessions")
+"""The sessions folder where nothing else is said."""
+
+UNTELLING_STEMS = ("transforms", "poses", "groundtruth", "images", "cameras")
+"""Names that every recording of a format has; its folder's says more."""
+
+Sessions = Annotated[
+    Path, typer.Option("--sessions", metavar="DIR", envvar="ARS_WEB_SESSIONS", help="The sessions folder.")
+]
+Session = Annotated[str, typer.Argument(metavar="SESSION", help="A session's id or its unique name.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace the file where it exists.")]
+Name = Annotated[str | None, typer.Option("--name", metavar="NAME", help="The session's name; default: as it came.")]
+Port = Annotated[int, typer.Option("--port", metavar="N", min=0, max=65535, help="Port; 0 takes a free one.")]
+
+# serve
+Host = Annotated[str, typer.Option("--host", metavar="HOST", help="Address to listen on.")]
+Roots = Annotated[
+    list[str] | None,
+    typer.Option("--root", metavar="NAME=PATH", help="A folder clients may import from, and its name; repeatable."),
+]
+Token = Annotated[
+    str | None,
+    typer.Option("--token", metavar="TOKEN", envvar="ARS_WEB_TOKEN", help="Bearer token; default: the folder's own."),
+]
+Executor = Annotated[
+    str, typer.Option("--executor", metavar="local|tls://HOST:PORT", help="Where exports run: here, or on Dask.")
+]
+
+# import
+RecordingPath = Annotated[Path, typer.Argument(metavar="PATH", help="A tracked recording: a folder or a file.")]
+RecordingFormat = Annotated[
+    str, typer.Option("--format", metavar="FORMAT", help="auto, or one that `ars-web formats` lists.")
+]
+ImageFolder = Annotated[
+    Path | None, typer.Option("--images", metavar="DIR", help="Image folder, if not the one the format implies.")
+]
+CameraFile = Annotated[
+    Path | None,
+    typer.Option("--camera", metavar="FILE", help="w h fx fy cx cy k1 k2 p1 p2, for formats without a camera."),
+]
+ClassNames = Annotated[str | None, typer.Option("--classes", metavar="A,B,C", help="Classes to begin with.")]
+Copy = Annotated[bool, typer.Option("--copy", help="Copy the images into the session.")]
+
+# export
+DatasetFormat = Annotated[str, typer.Option("--format", metavar="FORMAT", help="One that `ars-web formats` lists.")]
+DatasetFolder = Annotated[
+    Path, typer.Option("--out", metavar="DIR", help="The dataset's folder: a new one, or an empty one.")
+]
+FramesStep = Annotated[int | None, typer.Option("--frames-step", metavar="N", help="Every N-th frame; default 1.")]
+FramesStart = Annotated[int | None, typer.Option("--frames-start", metavar="N", help="From this index; default 0.")]
+FramesStop = Annotated[
+    int | None, typer.Option("--frames-stop", metavar="N", help="Up to this index, without it; default: the end.")
+]
+FramesList = Annotated[str | None, typer.Option("--frames-list", metavar="1,2,3", help="These indices alone.")]
+Images = Annotated[
+    Literal["link", "copy", "rectify", "none"] | None,
+    typer.Option("--images", help="Hard links (default), copies, undistorted copies, or no images."),
+]
+Shape = Annotated[
+    Literal["box", "hull", "mesh"] | None,
+    typer.Option("--shape", help="What is projected; default: the hull where a box has one, else the box."),
+]
+MinVisible = Annotated[
+    float | None, typer.Option("--min-visible", metavar="SHARE", help="Drop labels less visible; default 0.")
+]
+MaxTruncated = Annotated[
+    float | None, typer.Option("--max-truncated", metavar="SHARE", help="Drop labels more outside; default 1.")
+]
+MinArea = Annotated[
+    float | None, typer.Option("--min-area-px", metavar="PX", help="Drop labels of smaller area; default 4.")
+]
+SplitTrain = Annotated[float | None, typer.Option("--split-train", metavar="SHARE", help="Default 0.8.")]
+SplitVal = Annotated[float | None, typer.Option("--split-val", metavar="SHARE", help="Default 0.2.")]
+SplitTest = Annotated[float | None, typer.Option("--split-test", metavar="SHARE", help="Default 0.")]
+SplitBy = Annotated[
+    Literal["block", "frame", "session"] | None,
+    typer.Option("--split-by", help="Divide runs of frames (default), single frames, or whole sessions."),
+]
+SplitSeed = Annotated[int | None, typer.Option("--split-seed", metavar="N", help="Default 0.")]
+# The option is called `sessions` elsewhere; here that name is the sessions folder's.
+Merge = Annotated[
+    str | None, typer.Option("--merge", metavar="SESSION,SESSION", help="Further sessions in the same dataset.")
+]
+Workers = Annotated[int | None, typer.Option("--workers", metavar="N", min=1, help="Processes; default: one a core.")]
+
+
+def comma_separated(text: str | None, option: str) -> list[str]:
+    """The items of `text`, none where it is None.
+
+    Raises:
+        typer.BadParameter: an item is empty.
+    """
+    if text is None:
+        return []
+    items = [item.strip() for item in text.split(",")]
+    if not all(items):
+        raise typer.BadParameter(f"{text!r} has an empty item between its commas", param_hint=option)
+    return items
+
+
+def session_name(recording: Path) -> str:
+    """What to call a session where nobody said: after the folder, or the file where its name says something."""
+    path = recording.resolve()
+    if path.is_dir():
+        return path.name
+    return path.parent.name if path.stem in UNTELLING_STEMS else path.stem
+
+
+def named_roots(items: list[str] | None) -> dict[str, Path]:
+    """Folders by name, from `NAME=PATH` items.
+
+    Raises:
+        typer.BadParameter: an item is no such pair, or a name comes twice.
+    """
+    roots: dict[str, Path] = {}
+    for item in items or []:
+        name, _, path = item.partition("=")
+        if not name or not path:
+            raise typer.BadParameter(f"{item!r} is not NAME=PATH", param_hint="--root")
+        if name in roots:
+            raise typer.BadParameter(f"two folders are called {name!r}", param_hint="--root")
+        roots[name] = Path(path)
+    return roots
+
+
+def export_options(given: Mapping[str, object]) -> "ExportOptions":
+    """Export options from what was given, by the options' dotted names (`frames.step`); None: not given.
+
+    Raises:
+        typer.BadParameter: a value that its option cannot take; it is named as the command line spells it.
+    """
+    from pydantic import ValidationError
+
+    from ars_web.datasets.options import ExportOptions
+
+    nested: dict[str, object] = {}
+    groups: dict[str, dict[str, object]] = {"frames": {}, "split": {}}
+    for name, value in given.items():
+        if value is not None:
+            group, dot, key = name.partition(".")
+            (groups[group] if dot else nested)[key if dot else name] = value
+    try:
+        return ExportOptions.model_validate({**nested, **groups})
+    except ValidationError as error:
+        first = error.errors()[0]
+        hint = "--" + "-".join(str(part).replace("_", "-") for part in first["loc"] if isinstance(part, str))
+        message = first["msg"].removeprefix("Value error, ")
+        raise typer.BadParameter(f"{message}, not {first['input']!r}", param_hint=hint) from error

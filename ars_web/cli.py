@@ -1,0 +1,399 @@
+"""The commands of `ars-web`: each parses, calls what is below, and prints.
+
+Everything of ARS Web that takes long to import is imported inside the command that needs it, so that `--help` is
+there at once.
+"""
+
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ars_web import arguments as take
+from ars_web.errors import ArsError, BadInput
+from ars_web.terminal import json_bytes, note, print_json, print_table, progress
+
+if TYPE_CHECKING:
+    from ars_web.recordings.recording import SkippedFrame
+
+AUTHOR = "cli"
+"""Who the edit log says made the changes of this program."""
+
+INTERRUPTED = 130
+"""Exit status after Ctrl-C, as shells count it: 128 + SIGINT."""
+
+SKIPPED_SHOWN = 5
+"""Skipped frames that `import` names one by one; the rest are counted."""
+
+app = typer.Typer(
+    name="ars-web",
+    help="Turns a tracked camera recording and a few virtual boxes into a labelled training set.",
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+boxes_app = typer.Typer(help="A session's virtual boxes, in and out as JSON.", rich_markup_mode=None)
+app.add_typer(boxes_app, name="boxes")
+
+
+@app.callback(invoke_without_command=True)
+def top(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Print the version and stop.")] = False,
+) -> None:
+    from ars_web import __version__
+
+    if version:
+        print(f"ars-web {__version__}")
+    elif context.invoked_subcommand is None:
+        print(context.get_help())
+    else:
+        return
+    raise typer.Exit
+
+
+@app.command()
+def demo(
+    browser: Annotated[
+        bool, typer.Option("--browser/--no-browser", help="Serve the session and open its page.")
+    ] = True,
+    port: take.Port = 8000,
+    sessions: take.Sessions = take.SESSIONS,
+) -> None:
+    """Make the generated recording, import, box and export it, and open it in the browser.
+
+    What is there already is kept, so a second run is quick. With --no-browser, or where there is no screen, it
+    prints where everything is and ends.
+    """
+    from ars_web.demonstration import prepare
+
+    made = prepare(sessions, show=progress)
+    print(f"session   {made.session} in {sessions.resolve()}")
+    for name, folder in made.datasets.items():
+        print(f"dataset   {folder} ({name})")
+    print(f"pictures  {made.pictures}")
+    if browser and _has_screen():
+        _serve(sessions, port=port, open_browser=True)
+
+
+@app.command()
+def serve(
+    host: take.Host = "127.0.0.1",
+    port: take.Port = 8000,
+    root: take.Roots = None,
+    token: take.Token = None,
+    executor: take.Executor = "local",
+    sessions: take.Sessions = take.SESSIONS,
+) -> None:
+    """Answer the HTTP API, and the page, for a sessions folder."""
+    _serve(sessions, host=host, port=port, roots=take.named_roots(root), token=token, executor=executor)
+
+
+@app.command("import")
+def import_recording(
+    path: take.RecordingPath,
+    name: take.Name = None,
+    kind: take.RecordingFormat = "auto",
+    images: take.ImageFolder = None,
+    camera: take.CameraFile = None,
+    classes: take.ClassNames = None,
+    copy: take.Copy = False,
+    sessions: take.Sessions = take.SESSIONS,
+    as_json: take.Json = False,
+) -> None:
+    """Make a session from a tracked recording; its id is the last line printed."""
+    from ars_web.recordings.registry import READERS, ReadOptions, read_recording
+    from ars_web.sessions.store import SessionStore
+
+    if kind != "auto" and kind not in READERS:
+        raise typer.BadParameter(f"{kind!r} is none of auto, {', '.join(READERS)}", param_hint="--format")
+    class_names = take.comma_separated(classes, "--classes")
+    recording = read_recording(path, format=kind, options=ReadOptions(images=images, camera=camera))
+    with SessionStore(sessions) as store, progress("Importing frames") as advance:
+        made = store.create(
+            recording,
+            name=name or take.session_name(path),
+            class_names=class_names,
+            copy_images=copy,
+            progress=advance,
+        )
+    if as_json:
+        print_json({"session": made, "skipped": recording.skipped})
+        return
+    _note_skipped(recording.skipped)
+    note(f"{made.name}: {made.frames} frames ({made.format}), {made.classes} classes, {made.boxes} boxes")
+    print(made.id)
+
+
+@app.command("list")
+def list_sessions(sessions: take.Sessions = take.SESSIONS, as_json: take.Json = False) -> None:
+    """The sessions in the folder."""
+    from ars_web.sessions.store import SessionStore
+
+    with SessionStore(sessions) as store:
+        found = store.list()
+    if as_json:
+        print_json(found)
+        return
+    columns = ("id", "name", "format", "frames", "skipped", "classes", "boxes", "revision", "changed")
+    print_table(columns, [[*(getattr(s, c) for c in columns[:-1]), f"{s.changed:%Y-%m-%d %H:%M}"] for s in found])
+
+
+@boxes_app.command("import")
+def import_boxes(
+    session: take.Session,
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="JSON list of boxes, as the API answers it.")],
+    sessions: take.Sessions = take.SESSIONS,
+    as_json: take.Json = False,
+) -> None:
+    """Add all boxes of a file, as one step that one undo takes back."""
+    from ars_web.sessions.boxes_json import box_json, read_boxes_file
+    from ars_web.sessions.editing import SessionEditor
+    from ars_web.sessions.store import SessionStore
+
+    with SessionStore(sessions) as store:
+        added = SessionEditor(store).add_boxes(store.find(session), read_boxes_file(file), author=AUTHOR)
+    if as_json:
+        print_json([box_json(box) for box in added])
+    else:
+        print(f"{len(added)} boxes added")
+
+
+@boxes_app.command("export")
+def export_boxes(
+    session: take.Session,
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Where the JSON list goes; - for stdout.")],
+    force: take.Force = False,
+    sessions: take.Sessions = take.SESSIONS,
+) -> None:
+    """Write a session's boxes as the JSON list that the API answers."""
+    from ars_web.sessions.boxes_json import box_json
+    from ars_web.sessions.store import SessionStore
+
+    with SessionStore(sessions) as store:
+        boxes = [box_json(box) for box in store.state(store.find(session)).boxes.values()]
+    if str(file) == "-":
+        print_json(boxes)
+        return
+    if file.exists() and not force:
+        raise BadInput(f"{file} exists already: name another file, or replace it with --force")
+    _write_json(file, boxes)
+    note(f"{len(boxes)} boxes in {file}")
+
+
+@app.command()
+def export(
+    session: take.Session,
+    kind: take.DatasetFormat,
+    out: take.DatasetFolder,
+    frames_step: take.FramesStep = None,
+    frames_start: take.FramesStart = None,
+    frames_stop: take.FramesStop = None,
+    frames_list: take.FramesList = None,
+    images: take.Images = None,
+    shape: take.Shape = None,
+    min_visible: take.MinVisible = None,
+    max_truncated: take.MaxTruncated = None,
+    min_area_px: take.MinArea = None,
+    split_train: take.SplitTrain = None,
+    split_val: take.SplitVal = None,
+    split_test: take.SplitTest = None,
+    split_by: take.SplitBy = None,
+    split_seed: take.SplitSeed = None,
+    merge: take.Merge = None,
+    workers: take.Workers = None,
+    sessions: take.Sessions = take.SESSIONS,
+    as_json: take.Json = False,
+) -> None:
+    """Write a training set. Ctrl-C stops it; the same command then goes on from there."""
+    from ars_web.datasets.jobs import plan_export, run_export
+    from ars_web.datasets.registry import WRITERS
+    from ars_web.sessions.store import SessionStore
+
+    if kind not in WRITERS:
+        raise typer.BadParameter(f"{kind!r} is none of {', '.join(WRITERS)}", param_hint="--format")
+    with SessionStore(sessions) as store:
+        ids = [store.find(name) for name in (session, *take.comma_separated(merge, "--merge"))]
+        given = {
+            "frames.step": frames_step,
+            "frames.start": frames_start,
+            "frames.stop": frames_stop,
+            "frames.list": take.comma_separated(frames_list, "--frames-list") or None,
+            "images": images,
+            "shape": shape,
+            "min_visible": min_visible,
+            "max_truncated": max_truncated,
+            "min_area_px": min_area_px,
+            "split.train": split_train,
+            "split.val": split_val,
+            "split.test": split_test,
+            "split.by": split_by,
+            "split.seed": split_seed,
+            "sessions": ids[1:],
+        }
+        options = take.export_options(given)
+        snapshots = [store.snapshot(sid) for sid in ids]
+    plan = plan_export(snapshots, format=kind, options=options, out=out)
+    try:
+        with progress("Exporting") as advance:
+            report = run_export(plan, workers=workers, on_progress=advance)
+    except KeyboardInterrupt:
+        note("ars-web: stopped; the same command goes on from here")
+        raise typer.Exit(INTERRUPTED) from None
+    if as_json:
+        print_json({"out": plan.out, "report": report.model_dump(mode="json")})
+        return
+    rows = [(name, s.images, s.negatives, s.labels) for name, s in report.splits.items()]
+    print_table(("split", "images", "without a label", "labels"), rows)
+    dropped = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in report.dropped.items() if count)
+    print(f"dropped: {dropped or 'none'}")
+    print(plan.out)
+
+
+@app.command()
+def preview(
+    session: take.Session,
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the pictures.")],
+    frames: Annotated[int, typer.Option("--frames", metavar="N", min=1, help="How many.")] = 6,
+    sessions: take.Sessions = take.SESSIONS,
+    as_json: take.Json = False,
+) -> None:
+    """Draw the labels into a few frames, as PNG, and print the files."""
+    from ars_web.datasets.preview import preview as draw
+    from ars_web.sessions.store import SessionStore
+
+    with SessionStore(sessions) as store:
+        snapshot = store.snapshot(store.find(session))
+    pictures = draw(snapshot, out, count=frames)
+    if as_json:
+        print_json(pictures)
+    else:
+        print(*pictures, sep="\n")
+
+
+@app.command()
+def pack(
+    session: take.Session,
+    target: Annotated[Path, typer.Argument(metavar="TARGET", help="A new folder, or a new file ending in .zip.")],
+    sessions: take.Sessions = take.SESSIONS,
+) -> None:
+    """Write a whole session, images included, into one portable folder or zip."""
+    from ars_web.sessions.portable import export_session
+    from ars_web.sessions.store import SessionStore
+
+    with SessionStore(sessions) as store:
+        export_session(store, store.find(session), target)
+    print(target)
+
+
+@app.command()
+def unpack(
+    source: Annotated[Path, typer.Argument(metavar="SOURCE", help="What pack wrote: a folder or a zip.")],
+    name: take.Name = None,
+    sessions: take.Sessions = take.SESSIONS,
+    as_json: take.Json = False,
+) -> None:
+    """Take a packed session in as a new one; its id is the last line printed."""
+    from ars_web.sessions.portable import import_session
+    from ars_web.sessions.store import SessionStore
+
+    with SessionStore(sessions) as store:
+        made = import_session(store, source, name=name)
+    if as_json:
+        print_json(made)
+    else:
+        print(made.id)
+
+
+@app.command()
+def formats(as_json: take.Json = False) -> None:
+    """The formats that recordings come in and datasets go out."""
+    from ars_web.datasets.registry import WRITERS
+    from ars_web.recordings.registry import READERS
+
+    rows = [
+        *(("import", reader.format, reader.title) for reader in READERS.values()),
+        *(("export", writer.format, writer.title) for writer in WRITERS.values()),
+    ]
+    if as_json:
+        print_json([dict(zip(("direction", "format", "title"), row, strict=True)) for row in rows])
+    else:
+        print_table(("", "format", "what"), rows)
+
+
+@app.command()
+def check(sessions: take.Sessions = take.SESSIONS, as_json: take.Json = False) -> None:
+    """Look at the install, the sessions folder and its databases: what is wrong, and how to mend it."""
+    from ars_web.installation import findings
+
+    found = findings(sessions)
+    if as_json:
+        print_json(found)
+    else:
+        print_table(("", "what", "found"), [("ok" if f.ok else "WRONG", f.subject, f.found) for f in found])
+        for finding in found:
+            if not finding.ok:
+                note(f"{finding.subject}: {finding.remedy}")
+    if not all(finding.ok for finding in found):
+        raise typer.Exit(1)
+
+
+@app.command()
+def openapi() -> None:
+    """Print the API's OpenAPI document."""
+    from ars_web.app import create_app
+    from ars_web.settings import Settings
+
+    print_json(create_app(Settings(sessions=take.SESSIONS)).openapi())
+
+
+def main() -> None:
+    """Run the command line and end the process with its exit status."""
+    # The small matrices here gain nothing from a BLAS with threads, and every worker of an export would start some.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # Whoever ends it politely gets the same clean end as with Ctrl-C.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: Sequence[str]) -> int:
+    """The exit status of one command line: 0 done, 2 wrong arguments, 130 stopped by Ctrl-C, 1 anything else."""
+    try:
+        status = app(list(arguments), prog_name="ars-web", standalone_mode=False)
+    except typer.TyperException as error:
+        _fail(f"{error.format_message()} (see `ars-web --help`)")
+        return error.exit_code
+    except ArsError as error:
+        _fail(str(error))
+        return 1
+    except OSError as error:
+        _fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))
+        return 1
+    return status if isinstance(status, int) else 0
+
+
+def _has_screen() -> bool:
+    """Whether there is somebody to show a page to: a terminal, and a desktop to open a browser on."""
+    desktop = sys.platform == "darwin" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+    return sys.stdin.isatty() and desktop
+
+
+def _fail(message: str) -> None:
+    note("ars-web: " + " ".join(message.split("\n")))
+
+
+def _note_skipped(skipped: Sequence["SkippedFrame"]) -> None:
+    for frame in skipped[:SKIPPED_SHOWN]:
+        note(f"skipped {frame.name}: {frame.reason} ({frame.where})")
+    if len(skipped) > SKIPPED_SHOWN:
+        note(f"and {len(skipped) - SKIPPED_SHOWN} more: {len(skipped)} frames are skipped in all; --json lists them")
+
+
+def _write_json(file: Path, value: object) -> None:
+    part = file.with_name(f".{file.name}.part")
+    part.write_bytes(json_bytes(value))
+    part.replace(file)

@@ -1,0 +1,78 @@
+"""What the command line shows: progress, tables, JSON. Results go to stdout, everything else to stderr."""
+
+import sys
+import time
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+LINES_EVERY = 5.0
+"""Seconds between two lines of progress where there is no terminal to draw a bar on."""
+
+OnProgress = Callable[[int, int], None]
+"""Called with how much is done and how much there is in all."""
+
+
+def note(line: str) -> None:
+    """One line to the person at the keyboard, on stderr."""
+    print(line, file=sys.stderr, flush=True)
+
+
+def json_bytes(value: object) -> bytes:
+    """`value` as JSON; records become objects, times ISO 8601, paths texts."""
+    import orjson
+
+    return orjson.dumps(value, default=_json_value, option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
+
+
+def print_json(value: object) -> None:
+    """`value` as JSON on stdout."""
+    sys.stdout.write(json_bytes(value).decode())
+
+
+def _json_value(value: object) -> str:
+    if isinstance(value, Path):
+        return str(value)
+    raise TypeError(f"{type(value).__name__} has no form in JSON")
+
+
+def print_table(titles: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
+    """Aligned columns on stdout, numbers to the right; nothing is cut, whatever the terminal's width."""
+    cells = [[str(cell) for cell in row] for row in rows]
+    widths = [max(map(len, column)) for column in zip(titles, *cells, strict=True)]
+    right = [bool(rows) and all(isinstance(row[i], int | float) for row in rows) for i in range(len(titles))]
+    for line in [list(titles), *cells]:
+        padded = (
+            cell.rjust(width) if numeric else cell.ljust(width)
+            for cell, width, numeric in zip(line, widths, right, strict=True)
+        )
+        print("  ".join(padded).rstrip())
+
+
+@contextmanager
+def progress(title: str) -> Generator[OnProgress]:
+    """A bar on a terminal, a plain line every few seconds and at the end elsewhere; both on stderr."""
+    if sys.stderr.isatty():
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+        columns = (
+            TextColumn("{task.description}", markup=False),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeRemainingColumn(),
+        )
+        with Progress(*columns, console=Console(stderr=True)) as bar:
+            task = bar.add_task(title, total=None)
+            yield lambda done, total: bar.update(task, completed=done, total=total)
+        return
+
+    last = time.monotonic()
+
+    def line(done: int, total: int) -> None:
+        nonlocal last
+        if done == total or time.monotonic() - last >= LINES_EVERY:
+            last = time.monotonic()
+            note(f"{title}: {done} of {total}")
+
+    yield line
