@@ -10,7 +10,7 @@ import numpy as np
 from ars_web.errors import ArsError, BadFile, RefusedPath
 from ars_web.geometry.camera import Camera
 from ars_web.recordings.image_header import read_header
-from ars_web.recordings.options import ReadOptions
+from ars_web.recordings.options import ReadOptions, real
 from ars_web.recordings.pose_checks import CheckedPoses
 from ars_web.recordings.recording import Frame, SkippedFrame
 
@@ -82,19 +82,19 @@ def usable_frames(
 
 def _absolute(images: list[Path], within: Path | None) -> list[Path]:
     """The paths made absolute, links to folders followed; a link in the last place is kept, but must not lead out."""
-    root = None if within is None else within.resolve()
+    root = None if within is None else real(within)
     folders: dict[Path, Path] = {}
     absolute: list[Path] = []
     for image in images:
         parent = image.parent
         folder = folders.get(parent)
         if folder is None:
-            folder = folders[parent] = parent.resolve()
+            folder = folders[parent] = parent if "\0" in str(parent) else real(parent)
         path = folder / image.name
         if root is not None:
             outside = not folder.is_relative_to(root)
             # Folders are resolved already, so only the last place can be a link.
-            if outside or (path.is_symlink() and not path.resolve().is_relative_to(root)):
+            if outside or (path.is_symlink() and not real(path).is_relative_to(root)):
                 raise RefusedPath(f"the image {image} leads outside {within}, and nothing outside it is read")
         absolute.append(path)
     return absolute

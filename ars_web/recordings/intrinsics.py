@@ -5,6 +5,7 @@ from pathlib import Path
 from ars_web.errors import BadFile, BadInput
 from ars_web.geometry.camera import Camera, Model
 from ars_web.recordings.number_rows import read_rows
+from ars_web.recordings.options import ReadOptions, real
 
 CAMERA_FILE = "camera_intrinsics.txt"
 
@@ -68,3 +69,27 @@ def read_camera_file(path: Path) -> Camera:
         return camera_from_numbers(rows.values.ravel().tolist())
     except BadInput as error:
         raise BadFile(path, str(error), line=int(rows.lines[0])) from error
+
+
+def find_camera_file(folders: list[Path], options: ReadOptions) -> Path:
+    """The camera file that was named, or the one in `folders`.
+
+    Raises:
+        BadFile: there is none.
+        BadInput: several folders hold one each, and they differ.
+        RefusedPath: it lies outside `options.within`.
+    """
+    if options.camera is not None:
+        return options.allowed(options.camera)
+    places = list(dict.fromkeys(real(folder) / CAMERA_FILE for folder in folders))
+    found = [options.allowed(place) for place in places if place.is_file()]
+    if not found:
+        looked = " or ".join(str(place) for place in places)
+        raise BadFile(
+            places[0],
+            f"is missing: the format holds no camera of its own. Give a camera file ({' '.join(_NAMES[:10])}), or put"
+            f" one at {looked}",
+        )
+    if any(read_camera_file(place) != read_camera_file(found[0]) for place in found[1:]):
+        raise BadInput(f"{' and '.join(map(str, found))} hold different cameras; give the camera file that is meant")
+    return found[0]

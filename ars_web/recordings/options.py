@@ -1,5 +1,6 @@
 """What a caller may say about a recording that its files do not."""
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,9 +28,14 @@ class ReadOptions:
         Raises:
             RefusedPath: it lies outside `within` once its links are followed.
         """
-        if self.within is not None and not path.resolve().is_relative_to(self.within.resolve()):
+        if self.within is not None and not real(path).is_relative_to(real(self.within)):
             raise RefusedPath(f"{path} leads outside {self.within}, and nothing outside it is read")
         return path
+
+
+def real(path: Path) -> Path:
+    """`path` made absolute, links followed; links that run in a ring raise nothing, unlike in `Path.resolve`."""
+    return Path(os.path.realpath(path))
 
 
 NOTHING_SAID = ReadOptions()

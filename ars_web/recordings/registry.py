@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ars_web.errors import BadFile, BadInput
-from ars_web.recordings import ars
+from ars_web.recordings import ars, colmap, nerfstudio, poses, roars, tum
 from ars_web.recordings.options import NOTHING_SAID, ReadOptions
 from ars_web.recordings.recording import Recording
 
@@ -31,6 +31,11 @@ class Reader:
 
 READERS: dict[str, Reader] = {
     "ars": Reader("ars", ars.TITLE, ars.recognises, ars.read),
+    "roars": Reader("roars", roars.TITLE, roars.recognises, roars.read),
+    "tum": Reader("tum", tum.TITLE, tum.recognises, tum.read),
+    "colmap": Reader("colmap", colmap.TITLE, colmap.recognises, colmap.read),
+    "nerfstudio": Reader("nerfstudio", nerfstudio.TITLE, nerfstudio.recognises, nerfstudio.read),
+    "poses": Reader("poses", poses.TITLE, poses.recognises, poses.read),
 }
 
 
