@@ -18,7 +18,7 @@ from ars_web.geometry.camera import Camera
 from ars_web.geometry.occlusion import visible_fractions
 from ars_web.sessions.model import SessionSnapshot
 
-DROP_REASONS = ("not_in_image", "area", "truncation", "visibility")
+DROP_REASONS: tuple[str, ...] = ("not_in_image", "area", "truncation", "visibility")
 """Why a box of a frame has no label, in the order in which the rules are tried; the first that applies counts."""
 
 
@@ -38,6 +38,20 @@ class LabelTable:
     bbox_amodal: Float[np.ndarray, "n b 4"]
     truncated: Float[np.ndarray, "n b"]
     visible: Float[np.ndarray, "n b"]
+
+
+@dataclass(frozen=True, eq=False)
+class Outlines:
+    """Rings of labels one after the other, image coordinates.
+
+    Attributes:
+        points: (m, 2) of all rings.
+        starts: (n * b + 1,) where the ring of frame i and box j begins is `starts[i * b + j]`; it ends where the
+            next begins, and is empty for a label that was not asked for.
+    """
+
+    points: Float[np.ndarray, "m 2"]
+    starts: Int[np.ndarray, "k"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +103,24 @@ def labels_in_frames(
         if with_visible:
             table.visible[rows] = visible_fractions(camera, Ts, listed, found.bbox, step=step)
     return table
+
+
+def outlines_in_frames(
+    cameras: Mapping[int, Camera],
+    camera_ids: Int[np.ndarray, "n"],
+    Ts_world_camera: Float[np.ndarray, "n 4 4"],
+    boxes: Sequence[Box],
+    wanted: Bool[np.ndarray, "n b"],
+) -> Outlines:
+    """Outlines of the boxes in the frames where they are wanted."""
+    rings: list[Float[np.ndarray, "k 2"]] = [np.zeros((0, 2))]
+    lengths = np.zeros(wanted.size + 1, dtype=np.int64)
+    for flat in np.flatnonzero(wanted).tolist():
+        row, column = divmod(flat, len(boxes))
+        ring = geometry.outline(cameras[int(camera_ids[row])], Ts_world_camera[row], boxes[column])
+        rings.append(ring)
+        lengths[flat + 1] = len(ring)
+    return Outlines(np.concatenate(rings), np.cumsum(lengths))
 
 
 def label_table(snapshot: SessionSnapshot, indices: Sequence[int], *, step: int = 8) -> LabelTable:

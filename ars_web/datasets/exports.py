@@ -1,0 +1,282 @@
+"""Export jobs that survive the server: what was asked for, how far it is, and what became of it.
+
+A job is a folder `<sessions>/.exports/<job id>/` with `job.json`, replaced whole at every change of state, and, once
+done, the dataset in `dataset/`. Jobs run one after the other, each with all workers.
+"""
+
+import json
+import logging
+import os
+import secrets
+import shutil
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import TypeAdapter
+
+from ars_web.datasets.assembly import DOCUMENT
+from ars_web.datasets.jobs import partial_folder, run_export
+from ars_web.datasets.options import ExportOptions
+from ars_web.datasets.plan import ExportPlan, check_merged, plan_export
+from ars_web.datasets.plan_files import read_digest, read_plan
+from ars_web.datasets.registry import writer_of
+from ars_web.datasets.samples import check_shape
+from ars_web.errors import ArsError, BadInput, Cancelled, NotFound
+from ars_web.sessions.model import SessionSnapshot
+
+_log = logging.getLogger(__name__)
+
+State = Literal["queued", "running", "done", "failed", "cancelled"]
+
+
+@dataclass(frozen=True)
+class ExportJob:
+    """An export that was asked for.
+
+    Attributes:
+        session_id: the first session; those merged with it are in the options.
+        done, total: frames; total is 0 until the export is planned.
+        error: one clear line, of a failed job.
+        report: what `dataset.json` says, of a done job.
+        key: the Idempotency-Key it was asked for with.
+        created: UTC.
+    """
+
+    id: str
+    session_id: str
+    format: str
+    options: ExportOptions
+    state: State
+    done: int
+    total: int
+    error: str | None
+    report: dict[str, Any] | None
+    key: str | None
+    created: datetime
+
+
+_JSON = TypeAdapter(ExportJob)
+
+
+class _Closing(Exception):
+    """The server is going down: stop, but keep what is done."""
+
+
+class ExportJobs:
+    """All export jobs of a sessions folder."""
+
+    def __init__(
+        self,
+        folder: Path,
+        snapshot_of: Callable[[str], SessionSnapshot],
+        *,
+        executor_factory: Callable[[], Executor] | None = None,
+        workers: int | None = None,
+    ) -> None:
+        """`folder` is the sessions folder; `snapshot_of` raises NotFound for an unknown session id."""
+        self._folder = folder / ".exports"
+        self._snapshot_of = snapshot_of
+        self._executor_factory = executor_factory
+        self._workers = workers
+        self._lock = threading.Lock()
+        self._closing = threading.Event()
+        self._runner = ThreadPoolExecutor(max_workers=1, thread_name_prefix="export")
+        self._futures: dict[str, Future[None]] = {}
+        self._jobs: dict[str, ExportJob] = {}
+        for path in sorted(self._folder.glob("*/job.json")):
+            job = _JSON.validate_json(path.read_bytes())
+            self._jobs[job.id] = job
+
+    def start(
+        self,
+        sid: str,
+        *,
+        format: str,  # noqa: A002 - the contract's name
+        options: ExportOptions,
+        key: str | None = None,
+    ) -> ExportJob:
+        """Ask for an export of a session as it is now; the job, queued.
+
+        A repeat with the same `key` answers the job that the first made.
+
+        Raises:
+            NotFound: the session, or one merged with it, is not there.
+            BadInput: the format or an option cannot be, or `key` was used for another export.
+        """
+        writer_of(format)
+        check_shape(options.shape)
+        snapshots = self._snapshots(sid, options)
+        job = ExportJob(
+            id=f"x{secrets.token_hex(6)}",
+            session_id=sid,
+            format=format,
+            options=options,
+            state="queued",
+            done=0,
+            total=0,
+            error=None,
+            report=None,
+            key=key,
+            created=datetime.now(UTC),
+        )
+        with self._lock:
+            first = next((other for other in self._jobs.values() if key is not None and other.key == key), job)
+            if (first.session_id, first.format, first.options) != (sid, format, options):
+                raise BadInput(f"Idempotency-Key {key!r} was used for another export; use a new one")
+            if first is job:
+                self._keep(job)
+                self._jobs[job.id] = job
+                self._futures[job.id] = self._runner.submit(self._run, job.id, snapshots)
+        return first
+
+    def get(self, job_id: str) -> ExportJob:
+        """The job as it is now; NotFound."""
+        with self._lock:
+            if job_id not in self._jobs:
+                raise NotFound(f"there is no export {job_id!r}")
+            return self._jobs[job_id]
+
+    def list(self, sid: str | None = None) -> list[ExportJob]:
+        """All jobs, or a session's, the newest first."""
+        with self._lock:
+            jobs = [job for job in self._jobs.values() if sid in (None, job.session_id)]
+        return sorted(jobs, key=lambda job: (job.created, job.id), reverse=True)
+
+    def cancel(self, job_id: str) -> ExportJob:
+        """Stop a job; it is cancelled at once, its workers stop and its data goes soon after. A job that has ended
+        stays as it is."""
+        with self._lock:
+            if job_id not in self._jobs:
+                raise NotFound(f"there is no export {job_id!r}")
+            job = self._jobs[job_id]
+            if job.state in ("queued", "running"):
+                job = replace(job, state="cancelled")
+                self._jobs[job_id] = job
+                self._keep(job)
+            return job
+
+    def resume_unfinished(self) -> None:
+        """Go on with the jobs that a server left queued or running when it ended."""
+        with self._lock:
+            waiting = [job for job in self._jobs.values() if job.state in ("queued", "running")]
+        for job in sorted(waiting, key=lambda job: (job.created, job.id)):
+            if job.id not in self._futures:
+                self._futures[job.id] = self._runner.submit(self._run, job.id, None)
+
+    def dataset_folder(self, job_id: str) -> Path:
+        """Where a done job's dataset is; NotFound where there is none."""
+        job = self.get(job_id)
+        if job.state != "done":
+            raise NotFound(f"export {job_id} has no dataset: it is {job.state}")
+        return self._out(job_id)
+
+    def wait(self, job_id: str, *, timeout: float | None = None) -> ExportJob:
+        """The job once its work has ended, or TimeoutError."""
+        future = self._futures.get(job_id)
+        if future is not None:
+            future.result(timeout)
+        return self.get(job_id)
+
+    def close(self) -> None:
+        """Stop; unfinished jobs keep what is done and go on with `resume_unfinished` of the next server."""
+        self._closing.set()
+        self._runner.shutdown(wait=True, cancel_futures=True)
+
+    def _run(self, job_id: str, snapshots: Sequence[SessionSnapshot] | None) -> None:
+        """The whole life of a job, in the runner's thread."""
+        if self._closing.is_set() or not self._change(job_id, state="running"):
+            return
+        try:
+            report = self._finished_report(job_id)
+            if report is None:
+                plan = self._plan(self.get(job_id), snapshots)
+                run_export(
+                    plan,
+                    executor_factory=self._executor_factory,
+                    workers=self._workers,
+                    on_progress=lambda done, total: self._progress(job_id, done, total),
+                    cancelled=lambda: self._stopped(job_id),
+                )
+                report = self._finished_report(job_id)
+            self._change(job_id, state="done", report=report)
+        except _Closing:
+            return
+        except Cancelled:
+            pass
+        except ArsError as error:
+            self._change(job_id, state="failed", error=str(error))
+        except BaseException:
+            # A fault of this program: its trace goes on to whoever waits, and the job does not run for ever.
+            self._change(job_id, state="failed", error="the export ended by a fault in the program; see its log")
+            _log.exception("export %s", job_id)
+            raise
+        if self.get(job_id).state != "done":
+            self._remove_dataset(job_id)
+
+    def _plan(self, job: ExportJob, snapshots: Sequence[SessionSnapshot] | None) -> ExportPlan:
+        """The plan: the one that a killed server left, else one of the sessions as they are."""
+        out = self._out(job.id)
+        partial = partial_folder(out)
+        if snapshots is None and read_digest(partial) is not None:
+            return read_plan(partial, out=out)
+        return plan_export(
+            snapshots or self._snapshots(job.session_id, job.options), format=job.format, options=job.options, out=out
+        )
+
+    def _snapshots(self, sid: str, options: ExportOptions) -> Sequence[SessionSnapshot]:
+        snapshots = [self._snapshot_of(i) for i in (sid, *options.sessions)]
+        check_merged(snapshots)
+        return snapshots
+
+    def _finished_report(self, job_id: str) -> dict[str, Any] | None:
+        """The dataset's own report, once it is published."""
+        path = self._out(job_id) / DOCUMENT
+        return json.loads(path.read_bytes()) if path.is_file() else None
+
+    def _stopped(self, job_id: str) -> bool:
+        if self._closing.is_set():
+            raise _Closing
+        return self.get(job_id).state == "cancelled"
+
+    def _progress(self, job_id: str, done: int, total: int) -> None:
+        with self._lock:
+            self._jobs[job_id] = replace(self._jobs[job_id], done=done, total=total)
+
+    def _change(self, job_id: str, **changes: Any) -> bool:
+        """Change and keep a job, unless it was cancelled meanwhile."""
+        with self._lock:
+            job = self._jobs[job_id]
+            if job.state == "cancelled":
+                return False
+            if changes["state"] == "done":
+                changes["done"] = changes["total"] = sum(s["images"] for s in changes["report"]["splits"].values())
+            # In memory first: a full disk must not hide that the job failed.
+            self._jobs[job_id] = replace(job, **changes)
+            self._keep(self._jobs[job_id])
+            return True
+
+    def _keep(self, job: ExportJob) -> None:
+        """Put a job on the disk, whole. The caller holds the lock."""
+        folder = self._folder / job.id
+        folder.mkdir(parents=True, exist_ok=True)
+        beside = folder / "job.json.new"
+        with beside.open("wb") as file:
+            file.write(_JSON.dump_json(job))
+            file.flush()
+            os.fsync(file.fileno())
+        beside.replace(folder / "job.json")
+
+    def _out(self, job_id: str) -> Path:
+        return self._folder / job_id / "dataset"
+
+    def _remove_dataset(self, job_id: str) -> None:
+        """Remove what a failed job left, and what was published in the moment of a cancellation."""
+        for folder in (self._out(job_id), partial_folder(self._out(job_id))):
+            with suppress(FileNotFoundError):
+                shutil.rmtree(folder)

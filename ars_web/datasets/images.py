@@ -1,0 +1,127 @@
+"""The dataset's images: linked, copied, undistorted, or encoded anew where the format or a viewer needs it.
+
+Every source is looked at before it is used: it must be there, whole, unchanged since the export was planned, and of
+its camera's size.
+"""
+
+import errno
+import os
+import shutil
+import stat
+from functools import lru_cache
+from pathlib import Path, PurePath
+
+import cv2
+import numpy as np
+from jaxtyping import UInt8
+
+from ars_web.errors import BadFile
+from ars_web.geometry.camera import (
+    Camera,
+    distorted_from_normalised,
+    normalised_from_pixels,
+    rectified,
+)
+from ars_web.recordings.image_header import read_header
+from ars_web.recordings.images import read_image
+
+JPEG_QUALITY = 95
+
+_JPEG_SUFFIXES = (".jpg", ".jpeg")
+
+_NO_LINK = frozenset({errno.EXDEV, errno.EPERM, errno.EACCES, errno.EMLINK, errno.ENOTSUP, errno.ENOSYS})
+"""Another file system, a protected file, too many links, a file system without links: a copy is made instead."""
+
+
+def image_name(stem: str, source: str, *, only_jpeg: bool) -> str:
+    """The file name of an image in the dataset: JPEG and PNG keep their extension, in lower case."""
+    suffix = PurePath(source).suffix.lower()
+    if suffix in _JPEG_SUFFIXES:
+        return stem + (".jpg" if only_jpeg else suffix)
+    return stem + (".jpg" if only_jpeg else ".png")
+
+
+def place_image(source: str, target: Path, *, camera: Camera, stamp: tuple[int, int], images: str) -> None:
+    """Put the image `source` at `target` as the export option `images` says (not for `none`).
+
+    `stamp` is the size in bytes and the time of change in ns that the source had when the export was planned. An
+    image is encoded anew, as its target's extension says, where it is rectified, where the format wants another
+    encoding, and where its Exif asks viewers to turn it: the labels are for the pixels as they are stored.
+
+    Raises:
+        BadFile: the source is missing, damaged, changed, or not of its camera's size.
+        OSError: the target cannot be written.
+    """
+    source = _checked(source, stamp)
+    header = read_header(Path(source))
+    if not header.whole:
+        raise BadFile(source, "the image ends before its data does (truncated)")
+    if (header.width, header.height) != (camera.width, camera.height):
+        raise BadFile(
+            source,
+            f"the image is {header.width} x {header.height} pixels, but its camera's are"
+            f" {camera.width} x {camera.height}; labels would not fit it",
+        )
+    if images == "rectify" and camera.model != "pinhole":
+        _encode(rectify(read_image(Path(source)), camera), target)
+    elif header.orientation != 1 or not _same_encoding(source, target):
+        _encode(read_image(Path(source)), target)
+    elif images == "link":
+        _link(source, target)
+    else:
+        shutil.copyfile(source, target)
+
+
+def rectify(image: UInt8[np.ndarray, "h w 3"], camera: Camera) -> UInt8[np.ndarray, "h w 3"]:
+    """The image as `camera.rectified(camera)` would have taken it."""
+    whole, fraction = _rectifying_maps(camera)
+    return cv2.remap(image, whole, fraction, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+
+
+@lru_cache(maxsize=4)
+def _rectifying_maps(camera: Camera) -> tuple[np.ndarray, np.ndarray]:
+    """OpenCV's fixed-point maps (CV_16SC2) from the rectified image's pixels to the original's."""
+    flat = rectified(camera)
+    columns, rows = np.meshgrid(np.arange(flat.width, dtype=np.float64), np.arange(flat.height, dtype=np.float64))
+    rays = normalised_from_pixels(flat, np.stack([columns, rows], axis=-1))
+    pixels = distorted_from_normalised(camera, rays) * [camera.fx, camera.fy] + [camera.cx, camera.cy]
+    # Within `rectified` every ray has a pixel but for rounding at the border, which is replicated.
+    maps = np.nan_to_num(pixels, nan=-1.0).astype(np.float32)
+    whole, fraction = cv2.convertMaps(maps, np.zeros(0, dtype=np.float32), cv2.CV_16SC2)
+    return whole, fraction
+
+
+def _checked(source: str, stamp: tuple[int, int]) -> str:
+    """The source, or the file it is a link to; BadFile where it is missing or not what was planned with."""
+    try:
+        status = os.lstat(source)
+        if stat.S_ISLNK(status.st_mode):
+            # A hard link to a symbolic link would be a symbolic link, out of the dataset.
+            source = os.path.realpath(source)
+            status = os.stat(source)  # noqa: PTH116 - the path is a str throughout, for speed
+    except OSError as error:
+        raise BadFile(source, f"the image cannot be exported: {error.strerror}") from error
+    if (status.st_size, status.st_mtime_ns) != stamp:
+        raise BadFile(source, "the image changed since the export was planned; start the export again")
+    return source
+
+
+def _same_encoding(source: str, target: Path) -> bool:
+    a, b = PurePath(source).suffix.lower(), target.suffix
+    return a == b or (a in _JPEG_SUFFIXES and b in _JPEG_SUFFIXES)
+
+
+def _link(source: str, target: Path) -> None:
+    try:
+        os.link(source, target)
+    except OSError as error:
+        if error.errno not in _NO_LINK:
+            raise
+        shutil.copyfile(source, target)
+
+
+def _encode(image: UInt8[np.ndarray, "h w 3"], target: Path) -> None:
+    quality = [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY] if target.suffix in _JPEG_SUFFIXES else []
+    ok, content = cv2.imencode(target.suffix, image, quality)
+    assert ok, f"OpenCV cannot encode {target.suffix}"
+    target.write_bytes(content.data)

@@ -1,0 +1,130 @@
+"""An export's plan on disk, in the partial folder: all that a worker needs, without a database.
+
+`plan.json` holds names and numbers, `arrays.npz` the columns, `digest` the plan's SHA-256. The digest is written
+last: a folder without it holds no whole plan.
+"""
+
+import hashlib
+import json
+import os
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ars_web.datasets.options import ExportOptions
+from ars_web.datasets.plan import ExportPlan, PlannedFrames, PlannedSession
+from ars_web.geometry.box import Box, stack
+from ars_web.geometry.camera import Camera
+
+_VERSION = 1
+"""Of these files and of what a shard's folder holds; another version's partial folder is not resumed."""
+
+_COLUMNS = ("session", "index", "camera_id", "split", "Ts_world_camera", "stamps")
+
+
+def digest_of(plan: ExportPlan) -> str:
+    """The plan's SHA-256 in hex: over everything but where `out` is, so equal digests mean equal datasets."""
+    digest = hashlib.sha256(_document(plan))
+    for name, array in sorted(_arrays(plan).items()):
+        digest.update(f"{name} {array.dtype.str} {array.shape}\n".encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
+
+
+def write_plan(plan: ExportPlan, folder: Path) -> None:
+    """Write the plan into the folder, on the disk when this returns."""
+    _write_synced(folder / "plan.json", _document(plan))
+    with (folder / "arrays.npz").open("wb") as file:
+        np.savez(file, allow_pickle=False, **_arrays(plan))
+        file.flush()
+        os.fsync(file.fileno())
+    _write_synced(folder / "digest", digest_of(plan).encode())
+
+
+def read_digest(folder: Path) -> str | None:
+    """The digest of the plan in the folder, None where there is no whole plan."""
+    path = folder / "digest"
+    return path.read_text() if path.is_file() else None
+
+
+def read_plan(folder: Path, *, out: Path) -> ExportPlan:
+    """The plan in the folder, for the dataset at `out`."""
+    document: dict[str, Any] = json.loads((folder / "plan.json").read_bytes())
+    with np.load(folder / "arrays.npz", allow_pickle=False) as arrays:
+        columns = {name: arrays[name] for name in _COLUMNS}
+        boxes = [
+            tuple(Box(T, size) for T, size in zip(arrays[f"Ts_world_box_{i}"], arrays[f"sizes_{i}"], strict=True))
+            for i in range(len(document["sessions"]))
+        ]
+    sessions = tuple(
+        PlannedSession(
+            id=session["id"],
+            name=session["name"],
+            revision=session["revision"],
+            cameras={int(i): _camera(values) for i, values in session["cameras"].items()},
+            boxes=boxes[number],
+            class_of_box=tuple(session["class_of_box"]),
+        )
+        for number, session in enumerate(document["sessions"])
+    )
+    return ExportPlan(
+        out=out,
+        format=document["format"],
+        options=ExportOptions.model_validate(document["options"]),
+        class_names=tuple(document["class_names"]),
+        sessions=sessions,
+        frames=PlannedFrames(
+            **columns,
+            names=tuple(document["names"]),
+            stems=tuple(document["stems"]),
+            sources=tuple(document["sources"]),
+        ),
+        shards=tuple((start, stop) for start, stop in document["shards"]),
+    )
+
+
+def _document(plan: ExportPlan) -> bytes:
+    return json.dumps(
+        {
+            "version": _VERSION,
+            "format": plan.format,
+            "options": plan.options.model_dump(mode="json"),
+            "class_names": plan.class_names,
+            "sessions": [
+                {
+                    "id": s.id,
+                    "name": s.name,
+                    "revision": s.revision,
+                    "cameras": {str(i): asdict(camera) for i, camera in s.cameras.items()},
+                    "class_of_box": s.class_of_box,
+                }
+                for s in plan.sessions
+            ],
+            "names": plan.frames.names,
+            "stems": plan.frames.stems,
+            "sources": plan.frames.sources,
+            "shards": plan.shards,
+        }
+    ).encode()
+
+
+def _arrays(plan: ExportPlan) -> dict[str, np.ndarray]:
+    arrays = {name: np.asarray(getattr(plan.frames, name)) for name in _COLUMNS}
+    for number, session in enumerate(plan.sessions):
+        Ts, sizes = stack(list(session.boxes))
+        arrays |= {f"Ts_world_box_{number}": Ts, f"sizes_{number}": sizes}
+    return arrays
+
+
+def _camera(values: dict[str, Any]) -> Camera:
+    known: dict[str, Any] = values | {"distortion": tuple(values["distortion"])}
+    return Camera(**known)
+
+
+def _write_synced(path: Path, content: bytes) -> None:
+    with path.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())

@@ -1,0 +1,15 @@
+"""The dataset formats by name. Adding one is one file and one line here."""
+
+from ars_web.datasets.writers import ars, coco, voc, yolo
+from ars_web.datasets.writers.writer import Writer
+from ars_web.errors import BadInput
+
+WRITERS: dict[str, Writer] = {writer.format: writer for writer in (yolo.WRITER, coco.WRITER, voc.WRITER, ars.WRITER)}
+"""In the order in which they are offered."""
+
+
+def writer_of(format: str) -> Writer:  # noqa: A002 - the contract's name
+    """The writer of a format; BadInput names the known ones."""
+    if format not in WRITERS:
+        raise BadInput(f"export format {format!r} is unknown; known are {', '.join(WRITERS)}")
+    return WRITERS[format]

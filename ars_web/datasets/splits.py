@@ -1,0 +1,77 @@
+"""Splits: which frames train, which validate, which test.
+
+What is divided are units: contiguous blocks of frames, single frames, or whole sessions. Units are ranked by the
+SHA-256 of the seed and their place, and the ranks are dealt out by the shares. So the choice depends on nothing
+but the seed and the counts: not on a library's random stream, the machine, or a session's random id.
+"""
+
+import hashlib
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Int
+
+from ars_web.datasets.options import SplitChoice
+from ars_web.errors import BadInput
+
+SPLITS: tuple[Literal["train", "val", "test"], ...] = ("train", "val", "test")
+"""A split's number is its place here."""
+
+BLOCKS = 30
+"""Blocks in each session, as nearly as its frame count allows: enough to meet the shares and to spread over the
+recording, few enough that nearly every validation frame's neighbours are validation frames too."""
+
+
+def assign(frame_counts: Sequence[int], choice: SplitChoice) -> Int[np.ndarray, "n"]:
+    """The split number of each frame, the sessions' frames one after the other.
+
+    `frame_counts` are the chosen frames of each session. Shares are met to the nearest unit, within each session
+    for blocks and frames; every split with a positive share gets a unit where there are enough of them.
+
+    Raises:
+        BadInput: whole sessions are to be divided and there are fewer than splits.
+    """
+    shares = (choice.train, choice.val, choice.test)
+    if choice.by == "session":
+        wanted = [name for name, share in zip(SPLITS, shares, strict=True) if share > 0]
+        if len(frame_counts) < len(wanted):
+            raise BadInput(
+                f"a split by session needs a session for each of {', '.join(wanted)}, and this export has"
+                f" {len(frame_counts)}; merge more sessions, or split by 'block'"
+            )
+        of_session = _deal(len(frame_counts), shares, salt=f"{choice.seed}/sessions")
+        return np.repeat(of_session, np.asarray(frame_counts, dtype=np.int64))
+    parts = [np.zeros(0, dtype=np.int8)]
+    for number, count in enumerate(frame_counts):
+        units = min(BLOCKS, count) if choice.by == "block" else count
+        of_unit = _deal(units, shares, salt=f"{choice.seed}/{number}")
+        # Frame i lies in unit floor(i * units / count): lengths differ by one at most.
+        parts.append(of_unit[np.arange(count) * units // max(count, 1)])
+    return np.concatenate(parts)
+
+
+def apportion(units: int, shares: Sequence[float]) -> list[int]:
+    """How many of `units` each share gets: largest remainders, and at least one for a positive share where there
+    are as many units as positive shares."""
+    exact = [share * units for share in shares]
+    # 0.8 * 30 is 23.999...: a share that means a whole number gets it.
+    counts = [int(value + 1e-9) for value in exact]
+    by_remainder = sorted(range(len(shares)), key=lambda i: (counts[i] - exact[i], i))
+    for i in by_remainder[: units - sum(counts)]:
+        counts[i] += 1
+    positive = [i for i, share in enumerate(shares) if share > 0]
+    if units >= len(positive):
+        for i in positive:
+            if counts[i] == 0:
+                counts[max(range(len(shares)), key=counts.__getitem__)] -= 1
+                counts[i] = 1
+    return counts
+
+
+def _deal(units: int, shares: Sequence[float], *, salt: str) -> Int[np.ndarray, "m"]:
+    """The split number of each unit."""
+    ranked = sorted(range(units), key=lambda unit: hashlib.sha256(f"{salt}/{unit}".encode()).digest())
+    of_unit = np.zeros(units, dtype=np.int8)
+    of_unit[ranked] = np.repeat(np.arange(len(shares), dtype=np.int8), apportion(units, shares))
+    return of_unit

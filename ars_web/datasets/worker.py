@@ -1,0 +1,203 @@
+"""One shard of an export, done from the partial folder alone: what a worker process runs."""
+
+import os
+import shutil
+import signal
+import threading
+import time
+from collections.abc import Callable
+from functools import lru_cache
+from multiprocessing import connection, parent_process
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Int
+
+from ars_web.datasets.file_names import safe
+from ars_web.datasets.images import image_name, place_image
+from ars_web.datasets.plan import ExportPlan
+from ars_web.datasets.plan_files import read_plan
+from ars_web.datasets.registry import writer_of
+from ars_web.datasets.report import ShardReport, SplitCounts
+from ars_web.datasets.samples import Outlines, kept, labels_in_frames, outlines_in_frames
+from ars_web.datasets.splits import SPLITS
+from ars_web.datasets.writers.writer import Shard
+from ars_web.errors import Cancelled
+from ars_web.geometry.camera import rectified
+
+CANCEL = "cancel"
+"""A file of this name in the partial folder asks the workers to stop."""
+
+_LOOK_EVERY = 0.25
+"""Seconds between looks for it."""
+
+
+def start_worker() -> None:
+    """Make this process a good worker: one thread, deaf to Ctrl-C, gone when its parent is.
+
+    Without the last, a worker whose parent was killed would wait for work for ever.
+    """
+    import cv2
+    import numba
+
+    cv2.setNumThreads(1)
+    numba.set_num_threads(1)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = parent_process()
+    if parent is not None:
+        threading.Thread(target=_exit_after, args=(parent.sentinel,), daemon=True).start()
+
+
+def _exit_after(sentinel: int) -> None:
+    connection.wait([sentinel])
+    os._exit(1)
+
+
+def shard_folder(partial: Path, number: int) -> Path:
+    """Where a whole shard lies."""
+    return partial / "shards" / f"{number:05d}"
+
+
+def unfinished_folder(partial: Path, number: int) -> Path:
+    """Where a shard lies while it is written."""
+    return partial / "shards" / f"{number:05d}.tmp"
+
+
+def export_shard(partial: str, number: int, digest: str) -> int:
+    """Write shard `number` of the plan in the folder `partial`, which has this digest; its count of frames.
+
+    All of it is written beside its place and renamed there when whole: a shard is there, or it is not.
+
+    Raises:
+        BadFile: a source image cannot be exported.
+        Cancelled: someone asked the workers to stop.
+        OSError: the shard cannot be written.
+    """
+    plan, folder = _plan(partial, digest), Path(partial)
+    check = _watch(folder / CANCEL)
+    check()
+    tmp = unfinished_folder(folder, number)
+    shutil.rmtree(tmp, ignore_errors=True)
+    for name in ("files", "fragments"):
+        (tmp / name).mkdir(parents=True)
+    shard, dropped = _shard(plan, number)
+    check()
+    if plan.options.images != "none":
+        _place_images(plan, number, shard, tmp / "files", check)
+    digests = writer_of(plan.format).write(shard, tmp / "files", tmp / "fragments")
+    report = ShardReport(splits=_counts(shard), dropped=dropped, digests=digests)
+    (tmp / "shard.json").write_text(report.model_dump_json(), encoding="utf-8")
+    check()
+    _settle(tmp, shard_folder(folder, number))
+    return len(shard.stems)
+
+
+def _settle(tmp: Path, whole: Path) -> None:
+    """Rename a written shard to its place, once its bytes are on the disk."""
+    os.sync()
+    tmp.rename(whole)
+
+
+@lru_cache(maxsize=1)
+def _plan(partial: str, digest: str) -> ExportPlan:
+    """The plan, read once a process; the digest is in the key because a folder's plan may be replaced."""
+    return read_plan(Path(partial), out=Path(partial))
+
+
+def _watch(marker: Path) -> Callable[[], None]:
+    """A check that is cheap to call often and raises Cancelled once the marker is there."""
+    next_look = 0.0
+
+    def check() -> None:
+        nonlocal next_look
+        now = time.monotonic()
+        if now >= next_look:
+            next_look = now + _LOOK_EVERY
+            if marker.exists():
+                raise Cancelled("the export was cancelled")
+
+    return check
+
+
+def _shard(plan: ExportPlan, number: int) -> tuple[Shard, dict[str, int]]:
+    """The shard's frames with their labels, and how many labels were dropped by reason."""
+    start, stop = plan.shards[number]
+    frames, writer = plan.frames, writer_of(plan.format)
+    session = plan.sessions[int(frames.session[start])]
+    rectify = plan.options.images == "rectify"
+    cameras = {i: rectified(c) if rectify else c for i, c in session.cameras.items()}
+    camera_ids, Ts = frames.camera_id[start:stop], frames.Ts_world_camera[start:stop]
+    with_visible = writer.with_visible or plan.options.min_visible > 0
+    table = labels_in_frames(cameras, camera_ids, Ts, session.boxes, with_visible=with_visible)
+    keep, dropped = kept(table, plan.options)
+    wanted = keep if writer.with_outlines else np.zeros_like(keep)
+    outlines: Outlines = outlines_in_frames(cameras, camera_ids, Ts, session.boxes, wanted)
+    sizes: Int[np.ndarray, "n 2"] = np.array(
+        [(cameras[i].width, cameras[i].height) for i in camera_ids.tolist()], dtype=np.int64
+    )
+    sources, stems = frames.sources[start:stop], frames.stems[start:stop]
+    return (
+        Shard(
+            first=start,
+            splits=[SPLITS[i] for i in frames.split[start:stop].tolist()],
+            stems=stems,
+            image_names=[
+                image_name(stem, source, only_jpeg=writer.only_jpeg)
+                for stem, source in zip(stems, sources, strict=True)
+            ],
+            identities=[identity(name, source) for name, source in zip(frames.names[start:stop], sources, strict=True)],
+            sizes=sizes,
+            class_names=plan.class_names,
+            class_of_box=np.array(session.class_of_box, dtype=np.int64),
+            most_boxes=max(len(s.boxes) for s in plan.sessions),
+            table=table,
+            keep=keep,
+            outlines=outlines,
+        ),
+        dropped,
+    )
+
+
+def identity(name: str, source: str) -> str:
+    """`sceneFolder!imageFile`: the folder that holds the recording's image folder, and the frame's name in it.
+
+    Where the image folder is not called `images`, it is itself the scene's folder.
+    """
+    folder = Path(source).parents[name.count("/")]
+    scene = folder.parent if folder.name == "images" else folder
+    return f"{safe(scene.name)}!{name}"
+
+
+def _place_images(plan: ExportPlan, number: int, shard: Shard, files: Path, check: Callable[[], None]) -> None:
+    start, _ = plan.shards[number]
+    frames, image_folder = plan.frames, writer_of(plan.format).image_folder
+    cameras = plan.sessions[int(frames.session[start])].cameras
+    folders = {split: files / image_folder(split) for split in sorted(set(shard.splits))}
+    for folder in folders.values():
+        folder.mkdir(parents=True, exist_ok=True)
+    stamps: list[tuple[int, int]] = list(map(tuple, frames.stamps[start : start + len(shard.stems)].tolist()))
+    for i, (split, name, stamp) in enumerate(zip(shard.splits, shard.image_names, stamps, strict=True)):
+        check()
+        place_image(
+            frames.sources[start + i],
+            folders[split] / name,
+            camera=cameras[int(frames.camera_id[start + i])],
+            stamp=stamp,
+            images=plan.options.images,
+        )
+
+
+def _counts(shard: Shard) -> dict[str, SplitCounts]:
+    found: dict[str, SplitCounts] = {}
+    of_frame = np.array(shard.splits)
+    for split in sorted(set(shard.splits)):
+        keep = shard.keep[of_frame == split]
+        per_box = keep.sum(axis=0)
+        per_class = np.bincount(shard.class_of_box, weights=per_box, minlength=len(shard.class_names))
+        found[split] = SplitCounts(
+            images=len(keep),
+            negatives=int((~keep.any(axis=1)).sum()),
+            labels=int(keep.sum()),
+            classes=dict(zip(shard.class_names, per_class.astype(int).tolist(), strict=True)),
+        )
+    return found

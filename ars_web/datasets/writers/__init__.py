@@ -1,0 +1,1 @@
+"""Dataset formats: one writer a format, all of them values of `writer.Writer`."""
