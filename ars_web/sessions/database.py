@@ -1,5 +1,6 @@
 """One session's SQLite database: how it is opened, how a transaction begins, and what its failures mean."""
 
+import sqlite3
 import threading
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -39,7 +40,7 @@ class Database:
             with self._connect(write=False) as connection:
                 schema = migration.schema_of(connection)
             if schema != migration.SCHEMA:
-                with _explained(path):
+                with explained(path):
                     migration.bring_up_to_date(path)
         except BaseException:
             self.close()
@@ -77,7 +78,7 @@ class Database:
 
     @contextmanager
     def _connect(self, *, write: bool) -> Generator[Connection]:
-        with _explained(self.path), self._engine.connect().execution_options(ars_write=write) as connection:
+        with explained(self.path), self._engine.connect().execution_options(ars_write=write) as connection:
             with connection.begin():
                 yield connection
 
@@ -120,12 +121,14 @@ def _begin(connection: Connection) -> None:
 
 
 @contextmanager
-def _explained(path: Path) -> Generator[None]:
+def explained(path: Path) -> Generator[None]:
     """Say in words, and with the remedy, what SQLite says in codes."""
     try:
         yield
     except PoolTimeout as error:
         raise StoreError(f"{path}: too many requests at once; try again") from error
+    except sqlite3.Error as error:
+        raise StoreError(f"{path}: {_remedy(str(error))}") from error
     except DatabaseError as error:
         # Its other children (a broken constraint, a wrong statement) would be mistakes of this program.
         if not isinstance(error, OperationalError) and type(error) is not DatabaseError:

@@ -1,16 +1,19 @@
 """Edits, classes and boxes as the JSON that the log keeps. Every float comes back bit by bit."""
 
+import hashlib
 from datetime import UTC, datetime
 from typing import Any, cast
 
 import numpy as np
 import orjson
 
-from ars_web.errors import ArsError, StoreError
+from ars_web.errors import ArsError, BadInput, StoreError
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box
 from ars_web.sessions.edits import BoxChange, Change, ClassChange, NameChange
 from ars_web.sessions.model import ObjectClass, SessionState, VirtualBox
+from ars_web.sessions.names import checked_name
+from ars_web.sessions.palette import checked_color
 
 Json = dict[str, Any]
 
@@ -28,7 +31,7 @@ def changes_from_json(text: str) -> tuple[Change, ...]:
     """
     try:
         return tuple(_change(item) for item in orjson.loads(text))
-    except (ValueError, KeyError, TypeError, ArsError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, ArsError) as error:
         raise StoreError(f"an entry of the session's log cannot be read: {error}") from error
 
 
@@ -55,15 +58,20 @@ def state_from_json(text: str) -> SessionState:
     try:
         item = cast(Json, orjson.loads(text))
         return SessionState(
-            revision=item["revision"],
-            name=item["name"],
+            revision=_whole(item, "revision"),
+            name=checked_name(item["name"], what="a session"),
             classes={c["id"]: _class(c) for c in item["classes"]},
             boxes={b["id"]: _box(b) for b in item["boxes"]},
-            next_class_id=item["next_class_id"],
-            next_box_id=item["next_box_id"],
+            next_class_id=_whole(item, "next_class_id"),
+            next_box_id=_whole(item, "next_box_id"),
         )
-    except (ValueError, KeyError, TypeError, ArsError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, ArsError) as error:
         raise StoreError(f"the state that the session's log starts from cannot be read: {error}") from error
+
+
+def request_digest(*parts: object) -> str:
+    """A fingerprint of what a request asked for: equal for equal strings, numbers and arrays."""
+    return hashlib.sha256(orjson.dumps(parts, option=orjson.OPT_SERIALIZE_NUMPY)).hexdigest()
 
 
 def utc_text(at: datetime) -> str:
@@ -98,9 +106,9 @@ def _change(item: Json) -> Change:
         return BoxChange(item["box"], None if before is None else _box(before), None if after is None else _box(after))
     if "class" in item:
         return ClassChange(
-            item["class"], None if before is None else _class(before), None if after is None else _class(after)
+            _whole(item, "class"), None if before is None else _class(before), None if after is None else _class(after)
         )
-    return NameChange(before, after)
+    return NameChange(checked_name(before, what="a session"), checked_name(after, what="a session"))
 
 
 def _class_json(a_class: ObjectClass) -> Json:
@@ -108,7 +116,12 @@ def _class_json(a_class: ObjectClass) -> Json:
 
 
 def _class(item: Json) -> ObjectClass:
-    return ObjectClass(item["id"], item["name"], item["color"], item["revision"])
+    return ObjectClass(
+        id=_whole(item, "id"),
+        name=checked_name(item["name"], what="a class"),
+        color=checked_color(item["color"]),
+        revision=_whole(item, "revision"),
+    )
 
 
 def _box_json(box: VirtualBox) -> Json:
@@ -126,12 +139,21 @@ def _box_json(box: VirtualBox) -> Json:
 
 
 def _box(item: Json) -> VirtualBox:
-    T = rigid_transform.from_rotation(np.array(item["rotation"]).reshape(3, 3), np.array(item["position"]))
-    return VirtualBox(
-        id=item["id"],
-        class_id=item["class_id"],
-        name=item["name"],
-        box=Box(T, np.array(item["size"])),
-        has_hull=item["has_hull"],
-        revision=item["revision"],
+    T = rigid_transform.from_rotation(
+        np.array(item["rotation"], dtype=np.float64).reshape(3, 3), np.array(item["position"], dtype=np.float64)
     )
+    return VirtualBox(
+        id=_whole(item, "id"),
+        class_id=_whole(item, "class_id"),
+        name=checked_name(item["name"], what="a box"),
+        box=Box(T, np.array(item["size"], dtype=np.float64)),
+        has_hull=bool(item["has_hull"]),
+        revision=_whole(item, "revision"),
+    )
+
+
+def _whole(item: Json, name: str) -> int:
+    number = item[name]
+    if not isinstance(number, int) or number < 0:
+        raise BadInput(f"{name} must be a whole number from 0, not {number!r}")
+    return number

@@ -23,11 +23,12 @@ from ars_web.sessions.drafting import (
     drafted,
     free_class_name,
 )
+from ars_web.sessions.edit_json import request_digest
 from ars_web.sessions.edits import BoxChange, Change, ClassChange, Edit, NameChange, inverse, restated
 from ars_web.sessions.history import to_redo, to_undo
 from ars_web.sessions.listeners import Listener, Listeners
 from ars_web.sessions.model import ObjectClass, SessionSummary, VirtualBox
-from ars_web.sessions.names import checked_name
+from ars_web.sessions.names import checked_key, checked_name
 from ars_web.sessions.palette import checked_color, next_color
 from ars_web.sessions.store import SessionStore
 from ars_web.sessions.transaction import SessionTransaction
@@ -61,21 +62,29 @@ class SessionEditor:
     def add_box(
         self, sid: str, *, class_id: int, box: Box, name: str | None = None, author: str, key: str | None = None
     ) -> VirtualBox:
-        """A new box, called after its class unless `name` says otherwise."""
-        return self._add_boxes(sid, [BoxDraft(class_id, box, name)], author=author, summary=None)[0]
+        """A new box, called after its class unless `name` says otherwise.
+
+        A repeat with the same idempotency `key` returns what the first returned, and adds nothing.
+        """
+        with self._editing(sid) as session:
+            digest = request_digest("add box", author, class_id, box.T_world_box, box.size, name)
+            before = None if key is None else session.answered(checked_key(key), digest=digest)
+            if before is not None:
+                return _first_box(before)
+            boxes = drafted(session.state, [BoxDraft(class_id, box, name)])
+            edit = self._append(session, _additions(boxes), author=author, summary=f"Add {boxes[0].name}")
+            if key is not None:
+                session.remember(key, digest=digest)
+        return _first_box(edit)
 
     def add_boxes(
         self, sid: str, drafts: Sequence[BoxDraft], *, author: str, summary: str = "Import boxes"
     ) -> list[VirtualBox]:
         """Several boxes in one edit, which one undo takes back; none at all if one of them cannot be added."""
-        return self._add_boxes(sid, drafts, author=author, summary=summary)
-
-    def _add_boxes(self, sid: str, drafts: Sequence[BoxDraft], *, author: str, summary: str | None) -> list[VirtualBox]:
         with self._editing(sid) as session:
             boxes = drafted(session.state, drafts)
             if boxes:
-                changes = tuple(BoxChange(box.id, None, box) for box in boxes)
-                self._append(session, changes, author=author, summary=summary or f"Add {boxes[0].name}")
+                self._append(session, _additions(boxes), author=author, summary=summary)
         return boxes
 
     def change_box(
@@ -110,8 +119,15 @@ class SessionEditor:
     def add_class(
         self, sid: str, *, name: str, color: str | None = None, author: str, key: str | None = None
     ) -> ObjectClass:
-        """A new class, in the next colour of the palette unless `color` says otherwise."""
+        """A new class, in the next colour of the palette unless `color` says otherwise.
+
+        A repeat with the same idempotency `key` returns what the first returned, and adds nothing.
+        """
         with self._editing(sid) as session:
+            digest = request_digest("add class", author, name, color)
+            before = None if key is None else session.answered(checked_key(key), digest=digest)
+            if before is not None:
+                return _first_class(before)
             state = session.state
             added = ObjectClass(
                 id=state.next_class_id,
@@ -121,6 +137,8 @@ class SessionEditor:
             )
             change = ClassChange(added.id, None, added)
             self._append(session, (change,), author=author, summary=f"Add class {added.name}")
+            if key is not None:
+                session.remember(key, digest=digest)
         return added
 
     def change_class(
@@ -159,7 +177,7 @@ class SessionEditor:
             users = [box.name for box in session.state.boxes.values() if box.class_id == class_id]
             if users:
                 raise BadInput(
-                    f"class {before.name!r} is used by {len(users)} boxes ({', '.join(users[:5])}…);"
+                    f"class {before.name!r} is used by {len(users)} box(es), such as {users[0]!r};"
                     " delete them or give them another class first"
                 )
             change = ClassChange(class_id, before, None)
@@ -171,12 +189,13 @@ class SessionEditor:
             state, name = session.state, checked_name(name, what="a session")
             if state.revision != expected_revision:
                 raise Conflict(
-                    f"the session is at revision {state.revision}, not {expected_revision}", current=session.summary()
+                    f"the session is at revision {state.revision}, not {expected_revision}",
+                    current=session.summary(sid),
                 )
             if name != state.name:
                 change = NameChange(state.name, name)
                 self._append(session, (change,), author=author, summary=f"Rename the session to {name}")
-            summary = session.summary()
+            summary = session.summary(sid)
         return summary
 
     def undo(self, sid: str, *, author: str) -> Edit:
@@ -190,7 +209,7 @@ class SessionEditor:
             revision = to_undo(session.newest_entries(author=author))
             if revision is None:
                 raise NothingToUndo(f"{author!r} has nothing to undo in this session")
-            edit = self._invert(session, session.edit(revision), author=author, verb="Undo")
+            edit = self._invert(sid, session, session.edit(revision), author=author, verb="Undo")
         return edit
 
     def redo(self, sid: str, *, author: str) -> Edit:
@@ -204,7 +223,7 @@ class SessionEditor:
             revision = to_redo(session.newest_entries(author=author))
             if revision is None:
                 raise NothingToUndo(f"{author!r} has nothing to redo in this session")
-            edit = self._invert(session, session.edit(revision), author=author, verb="Redo")
+            edit = self._invert(sid, session, session.edit(revision), author=author, verb="Redo")
         return edit
 
     @contextmanager
@@ -213,8 +232,13 @@ class SessionEditor:
             yield session
         self._listeners.tell()
 
-    def _invert(self, session: SessionTransaction, edit: Edit, *, author: str, verb: str) -> Edit:
-        changes = restated(inverse(edit.changes), session.state, revision=session.state.revision + 1)
+    def _invert(self, sid: str, session: SessionTransaction, edit: Edit, *, author: str, verb: str) -> Edit:
+        try:
+            changes = restated(inverse(edit.changes), session.state, revision=session.state.revision + 1)
+        except Conflict as error:
+            if isinstance(error.current, str):  # the session's name; callers get the whole summary
+                raise Conflict(str(error), current=session.summary(sid)) from error
+            raise
         return self._append(
             session,
             changes,
@@ -245,3 +269,21 @@ class SessionEditor:
         )
         session.append(edit)
         return edit
+
+
+def _additions(boxes: Sequence[VirtualBox]) -> tuple[BoxChange, ...]:
+    return tuple(BoxChange(box.id, None, box) for box in boxes)
+
+
+def _first_box(edit: Edit) -> VirtualBox:
+    change = edit.changes[0]
+    assert isinstance(change, BoxChange)
+    assert change.after is not None
+    return change.after
+
+
+def _first_class(edit: Edit) -> ObjectClass:
+    change = edit.changes[0]
+    assert isinstance(change, ClassChange)
+    assert change.after is not None
+    return change.after

@@ -4,9 +4,10 @@ An `Edit` is a list of changes, each holding what it found and what it left. So 
 appends an inverse edit, and an edit that no longer finds what it expects is a conflict, never a silent loss.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
+from functools import reduce
 from typing import TypeVar
 
 import numpy as np
@@ -154,6 +155,30 @@ def apply(state: SessionState, edit: Edit) -> SessionState:
         ),
         next_box_id=max(state.next_box_id, *(c.box_id + 1 for c in edit.changes if isinstance(c, BoxChange)), 0),
     )
+
+
+def replay(origin: SessionState, edits: Iterable[Edit]) -> SessionState:
+    """The state that a log of edits leads to, from the state at its beginning.
+
+    Raises:
+        Conflict: an edit is missing or does not fit.
+    """
+    return reduce(apply, edits, origin)
+
+
+def differences(a: SessionState, b: SessionState) -> list[str]:
+    """In what two states differ, in words; empty where they are alike, bit by bit."""
+    found: list[str] = []
+    for what in ("revision", "name", "next_class_id", "next_box_id"):
+        if getattr(a, what) != getattr(b, what):
+            found.append(f"{what}: {getattr(a, what)!r} and {getattr(b, what)!r}")
+    found += [f"class {id_}" for id_ in _unlike(a.classes, b.classes)]
+    found += [f"box {id_}" for id_ in _unlike(a.boxes, b.boxes)]
+    return found
+
+
+def _unlike(a: Mapping[int, Thing], b: Mapping[int, Thing]) -> list[int]:
+    return [id_ for id_ in sorted(a.keys() | b.keys()) if not same(a.get(id_), b.get(id_))]
 
 
 def _put(

@@ -11,7 +11,7 @@ from sqlalchemy.pool import ConnectionPoolEntry, NullPool
 
 from ars_web.errors import StoreError
 
-SCHEMA = "0001"
+SCHEMA = "0002"
 """The newest step under `migrations/versions`. A constant, so that opening a session does not load Alembic."""
 
 SCRIPTS = Path(__file__).parent / "migrations"

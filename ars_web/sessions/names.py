@@ -9,6 +9,8 @@ from ars_web.errors import BadInput, RefusedPath
 LONGEST_NAME = 100
 """Characters."""
 
+LONGEST_KEY = 255
+
 
 def checked_name(name: str, *, what: str) -> str:
     """`name` without blanks around it; `what` says whose name it is, such as `a class`.
@@ -25,6 +27,17 @@ def checked_name(name: str, *, what: str) -> str:
     if _unprintable(name):
         raise BadInput(f"{what}'s name cannot hold a control character: {name!r}")
     return name
+
+
+def checked_key(key: str) -> str:
+    """An idempotency key.
+
+    Raises:
+        BadInput: it is empty, longer than LONGEST_KEY characters, or holds a control character.
+    """
+    if not key or len(key) > LONGEST_KEY or _unprintable(key):
+        raise BadInput(f"an idempotency key has 1 to {LONGEST_KEY} printable characters, not {key[:40]!r}")
+    return key
 
 
 def unused_name(base: str, taken: Iterable[str]) -> str:

@@ -1,6 +1,7 @@
 """A session's rows as the model's records, and back. Every query and statement is here."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -32,6 +33,14 @@ IMAGES = "images"
 """The folder, in a session's own, of images that were copied in."""
 
 FRAMES_AT_ONCE = 2000
+
+
+@dataclass(frozen=True)
+class Request:
+    """A request that was answered: what it asked for, as a digest, and the revision that was the answer."""
+
+    digest: str
+    revision: int
 
 
 def load_revision(connection: Connection) -> int:
@@ -141,6 +150,18 @@ def newest_entries(connection: Connection, *, author: str) -> Iterator[LogEntry]
     with connection.execute(newest) as rows:
         for revision, undoes, redoes in rows:
             yield LogEntry(revision, undoes, redoes)
+
+
+def load_request(connection: Connection, key: str) -> Request | None:
+    """The request that came with an idempotency key."""
+    r = tables.request.c
+    found = connection.execute(select(r.digest, r.revision).where(r.key == key)).first()
+    return None if found is None else Request(found.digest, found.revision)
+
+
+def insert_request(connection: Connection, key: str, request: Request) -> None:
+    """Keep what came with an idempotency key."""
+    connection.execute(insert(tables.request).values(key=key, digest=request.digest, revision=request.revision))
 
 
 def insert_recording(

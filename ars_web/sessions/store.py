@@ -12,13 +12,15 @@ from typing import Self
 
 from sqlalchemy import Connection
 
-from ars_web.errors import BadInput, NotFound, StoreError
+from ars_web.errors import ArsError, BadInput, NotFound, StoreError
 from ars_web.geometry.camera import Camera
 from ars_web.recordings.recording import Recording, SkippedFrame
 from ars_web.sessions import rows, session_folders
-from ars_web.sessions.database import Database
+from ars_web.sessions.checking import check_session
+from ars_web.sessions.database import Database, explained
 from ars_web.sessions.edits import Edit, apply
 from ars_web.sessions.importing import fill, starting_state
+from ars_web.sessions.migration import back_up
 from ars_web.sessions.model import FrameTable, SessionSnapshot, SessionState, SessionSummary
 from ars_web.sessions.transaction import SessionTransaction
 
@@ -109,6 +111,20 @@ class SessionStore:
         with self._reading(sid) as (connection, _):
             return rows.load_edits(connection, after=after, limit=limit)
 
+    def check(self) -> list[str]:
+        """What is wrong with the sessions folder and each session, in words with the remedy; empty if nothing is."""
+        problems: list[str] = []
+        remains = session_folders.leftovers(self.folder)
+        if remains:
+            problems.append(f"{len(remains)} unfinished imports lie in {remains[0].parent}: running, or to be deleted")
+        for sid in session_folders.session_ids(self.folder):
+            try:
+                with self._reading(sid) as (connection, _):
+                    problems += [f"session {sid}: {what}" for what in check_session(connection, self.folder / sid)]
+            except ArsError as error:
+                problems.append(f"session {sid}: {error}")
+        return problems
+
     def list(self) -> list[SessionSummary]:
         """All sessions, oldest first. A damaged one is left out; `check` says what is wrong with it."""
         found: list[SessionSummary] = []
@@ -191,6 +207,18 @@ class SessionStore:
         """
         session_folders.bring_back(self.folder, sid)
 
+    def back_up(self, sid: str, target: Path) -> None:
+        """Copy the session's database, as it is at one moment, to the single file `target`."""
+        with self._reading(sid) as (_, session), explained(session.database.path):
+            back_up(session.database.path, target)
+
+    def take_in(self, fill: Callable[[Path], None]) -> str:
+        """A new session of which `fill` writes the whole folder, and its id. For `portable.py`."""
+        sid = session_folders.new_id()
+        with session_folders.building(self.folder, sid) as building:
+            fill(building)
+        return sid
+
     @contextmanager
     def writing(
         self, sid: str, *, committed: Callable[[Sequence[Edit]], None] | None = None
@@ -203,7 +231,7 @@ class SessionStore:
         session = self._session(sid)
         with session.database.write_lock:
             with session.database.writing() as connection:
-                transaction = SessionTransaction(sid, connection, _current_state(connection, session))
+                transaction = SessionTransaction(connection, _current_state(connection, session))
                 yield transaction
             session.state = transaction.state
             if committed is not None:

@@ -107,3 +107,12 @@ edit = Table(
     Column("at", Text, nullable=False),
     Index("edit_by_author", "author", "revision"),
 )
+
+request = Table(
+    "request",
+    metadata,
+    # The client's idempotency key, what it asked for as a digest, and the edit that was the answer.
+    Column("key", Text, primary_key=True),
+    Column("digest", Text, nullable=False),
+    Column("revision", Integer, ForeignKey("edit.revision"), nullable=False),
+)

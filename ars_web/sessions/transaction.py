@@ -4,10 +4,12 @@ from collections.abc import Iterator
 
 from sqlalchemy import Connection
 
+from ars_web.errors import BadInput
 from ars_web.sessions import rows
 from ars_web.sessions.edits import Edit, apply
 from ars_web.sessions.history import LogEntry
 from ars_web.sessions.model import SessionState, SessionSummary
+from ars_web.sessions.rows import Request
 
 
 class SessionTransaction:
@@ -18,10 +20,9 @@ class SessionTransaction:
         appended: those edits.
     """
 
-    def __init__(self, sid: str, connection: Connection, state: SessionState) -> None:
+    def __init__(self, connection: Connection, state: SessionState) -> None:
         self.state = state
         self.appended: list[Edit] = []
-        self._sid = sid
         self._connection = connection
 
     def append(self, edit: Edit) -> None:
@@ -35,9 +36,26 @@ class SessionTransaction:
         self.state = state
         self.appended.append(edit)
 
-    def summary(self) -> SessionSummary:
-        """The session as a list shows it."""
-        return rows.load_summary(self._connection, self._sid)
+    def answered(self, key: str, *, digest: str) -> Edit | None:
+        """The edit that was the answer to an earlier request with this idempotency key; None for a new key.
+
+        Raises:
+            BadInput: that request was another one.
+        """
+        found = rows.load_request(self._connection, key)
+        if found is None:
+            return None
+        if found.digest != digest:
+            raise BadInput(f"the idempotency key {key!r} was used for another request; use a new key for this one")
+        return self.edit(found.revision)
+
+    def remember(self, key: str, *, digest: str) -> None:
+        """Keep that the newest edit is the answer to the request with this idempotency key."""
+        rows.insert_request(self._connection, key, Request(digest, self.state.revision))
+
+    def summary(self, sid: str) -> SessionSummary:
+        """The session, whose id is `sid`, as a list shows it."""
+        return rows.load_summary(self._connection, sid)
 
     def edit(self, revision: int) -> Edit:
         """The log's entry that made `revision`."""

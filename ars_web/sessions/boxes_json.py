@@ -1,0 +1,152 @@
+"""Boxes and classes as the JSON of the API and of box files."""
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, field_validator
+
+from ars_web.errors import BadFile, BadInput
+from ars_web.geometry import rigid_transform
+from ars_web.geometry.box import LARGEST_SIZE, Box
+from ars_web.geometry.rigid_transform import Transform
+from ars_web.sessions.drafting import BoxDraft
+from ars_web.sessions.model import ObjectClass, VirtualBox
+from ars_web.sessions.names import LONGEST_NAME
+
+# Strict: a truth value or a string is no number. Whole numbers are.
+Coordinate = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Length = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0, le=LARGEST_SIZE)]
+Size = tuple[Length, Length, Length]
+Id = Annotated[int, Field(strict=True, ge=0)]
+Name = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME)]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class TransformJson(_Strict):
+    """A rigid transform: a position in metres and a quaternion, w first, of any length but zero."""
+
+    position: tuple[Coordinate, Coordinate, Coordinate]
+    wxyz: tuple[Coordinate, Coordinate, Coordinate, Coordinate]
+
+    @field_validator("wxyz")
+    @classmethod
+    def _has_a_direction(cls, wxyz: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+        length = np.linalg.norm(wxyz)
+        if not 1e-9 <= length < np.inf:
+            raise ValueError("a quaternion must not be zero, nor too long to be normalised")
+        return wxyz
+
+    @property
+    def matrix(self) -> Transform:
+        """As (4, 4)."""
+        return rigid_transform.from_position_wxyz(np.array(self.position), np.array(self.wxyz))
+
+
+class BoxJson(_Strict):
+    """A box to be added."""
+
+    class_id: Id
+    T_world_box: TransformJson = Field(description="the box's centre and axes in the world")
+    size: Size = Field(description="metres along the box's own axes")
+    name: Name | None = Field(None, description="default: the class's name, with a number where it is taken")
+
+    @property
+    def draft(self) -> BoxDraft:
+        """As `SessionEditor` takes it."""
+        return BoxDraft(self.class_id, Box(self.T_world_box.matrix, np.array(self.size)), self.name)
+
+
+class BoxPatchJson(_Strict):
+    """What of a box is to change; what is not given stays."""
+
+    class_id: Id | None = None
+    T_world_box: TransformJson | None = None
+    size: Size | None = None
+    name: Name | None = None
+
+
+class BoxFileItem(BoxJson):
+    """A box in a file: what `GET …/boxes` answers, of which `id`, `has_hull` and `revision` are not taken over."""
+
+    id: Id | None = None
+    has_hull: bool | None = None
+    revision: Id | None = None
+
+
+_BOX_FILE = TypeAdapter(list[BoxFileItem])
+
+
+def transform_json(T: Transform) -> dict[str, list[float]]:
+    """`{"position", "wxyz"}` of a transform; the quaternion is of unit length with w >= 0."""
+    return {
+        "position": T[:3, 3].tolist(),
+        "wxyz": rigid_transform.wxyz_from_rotation(T[:3, :3]).tolist(),
+    }
+
+
+def box_json(box: VirtualBox) -> dict[str, Any]:
+    """The box as the API answers it and box files hold it."""
+    return {
+        "id": box.id,
+        "class_id": box.class_id,
+        "name": box.name,
+        "T_world_box": transform_json(box.box.T_world_box),
+        "size": box.box.size.tolist(),
+        "has_hull": box.has_hull,
+        "revision": box.revision,
+    }
+
+
+def class_json(a_class: ObjectClass) -> dict[str, Any]:
+    """The class as the API answers it."""
+    return {"id": a_class.id, "name": a_class.name, "color": a_class.color, "revision": a_class.revision}
+
+
+def read_boxes_file(path: Path) -> list[BoxDraft]:
+    """The boxes of a JSON file: the list that `GET …/boxes` answers.
+
+    Raises:
+        BadFile: it cannot be read or is not such a list; the message says which box and which of its values.
+    """
+    try:
+        text = path.read_bytes().decode("utf-8-sig")
+        # Not orjson: of a name given twice in one object it would silently take one.
+        items = json.loads(text, object_pairs_hook=_without_repeats)
+        boxes = _BOX_FILE.validate_python(items)
+    except OSError as error:
+        raise BadFile(path, f"cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise BadFile(path, f"is not text in UTF-8 (byte {error.start})") from error
+    except json.JSONDecodeError as error:
+        raise BadFile(path, f"is not JSON: {error.msg}", line=error.lineno) from error
+    except ValidationError as error:
+        raise BadFile(path, _first_fault(error)) from error
+    except (BadInput, RecursionError) as error:
+        raise BadFile(path, f"is not a list of boxes: {error}") from error
+    return [box.draft for box in boxes]
+
+
+def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) != len(pairs):
+        twice = next(key for key, _ in pairs if sum(key == other for other, _ in pairs) > 1)
+        raise BadInput(f"{twice!r} is given twice in one object")
+    return found
+
+
+def _first_fault(error: ValidationError) -> str:
+    """Where in the list the first fault is, and what it is."""
+    faults = error.errors(include_url=False)
+    fault = faults[0]
+    place = list(fault["loc"])
+    if not place:
+        return "must hold a list of boxes, as `ars-web boxes export` writes it"
+    where = f"box {place[0]}" + "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in place[1:])
+    more = f" (and {len(faults) - 1} more faults)" if len(faults) > 1 else ""
+    given = "" if fault["type"] == "missing" else f", not {str(fault['input'])[:60]}"
+    return f"{where}: {fault['msg']}{given}{more}; boxes are counted from 0"
