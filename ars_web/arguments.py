@@ -7,13 +7,19 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 if TYPE_CHECKING:
+    from pydantic import ValidationError
+
     from ars_web.datasets.options import ExportOptions
+    from ars_web.settings import Settings
 
 SESSIONS = Path("sessions")
 """The sessions folder where nothing else is said."""
 
 UNTELLING_STEMS = ("transforms", "poses", "groundtruth", "images", "cameras")
 """Names that every recording of a format has; its folder's says more."""
+
+SPELLED_DIFFERENTLY = {"sessions": "--merge", "roots": "--root", "hosts": "--allow-host"}
+"""Options whose name is not that of their setting with dashes."""
 
 Sessions = Annotated[
     Path, typer.Option("--sessions", metavar="DIR", envvar="ARS_WEB_SESSIONS", help="The sessions folder.")
@@ -36,6 +42,11 @@ Token = Annotated[
 ]
 Executor = Annotated[
     str, typer.Option("--executor", metavar="local|tls://HOST:PORT", help="Where exports run: here, or on Dask.")
+]
+
+AllowedHosts = Annotated[
+    list[str] | None,
+    typer.Option("--allow-host", metavar="NAME", help="A further name the server is reached by; repeatable."),
 ]
 
 # import
@@ -154,7 +165,30 @@ def export_options(given: Mapping[str, object]) -> "ExportOptions":
     try:
         return ExportOptions.model_validate({**nested, **groups})
     except ValidationError as error:
-        first = error.errors()[0]
-        hint = "--" + "-".join(str(part).replace("_", "-") for part in first["loc"] if isinstance(part, str))
-        message = first["msg"].removeprefix("Value error, ")
-        raise typer.BadParameter(f"{message}, not {first['input']!r}", param_hint=hint) from error
+        raise _refused(error) from error
+
+
+def server_settings(given: Mapping[str, object]) -> "Settings":
+    """A server's settings by their names.
+
+    Raises:
+        typer.BadParameter: a value that its option cannot take.
+    """
+    from pydantic import ValidationError
+
+    from ars_web.settings import Settings
+
+    try:
+        return Settings.model_validate(given)
+    except ValidationError as error:
+        raise _refused(error) from error
+
+
+def _refused(error: "ValidationError") -> typer.BadParameter:
+    """The first fault, named as the command line spells it."""
+    fault = error.errors()[0]
+    names = [part for part in fault["loc"] if isinstance(part, str)]
+    option = SPELLED_DIFFERENTLY.get(names[0], "--" + "-".join(names).replace("_", "-")) if names else None
+    message = fault["msg"].removeprefix("Value error, ")
+    given = "" if isinstance(fault["input"], dict) else f", not {fault['input']}"
+    return typer.BadParameter(f"{message}{given}", param_hint=option)

@@ -15,7 +15,7 @@ import typer
 
 from ars_web import arguments as take
 from ars_web.errors import ArsError, BadInput
-from ars_web.terminal import json_bytes, note, print_json, print_table, progress
+from ars_web.terminal import has_screen, note, open_browser, print_json, print_table, progress, write_json
 
 if TYPE_CHECKING:
     from ars_web.recordings.recording import SkippedFrame
@@ -35,6 +35,7 @@ app = typer.Typer(
     add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
+    context_settings={"max_content_width": 120},
 )
 boxes_app = typer.Typer(help="A session's virtual boxes, in and out as JSON.", rich_markup_mode=None)
 app.add_typer(boxes_app, name="boxes")
@@ -76,8 +77,10 @@ def demo(
     for name, folder in made.datasets.items():
         print(f"dataset   {folder} ({name})")
     print(f"pictures  {made.pictures}")
-    if browser and _has_screen():
-        _serve(sessions, port=port, open_browser=True)
+    if browser and has_screen():
+        from ars_web.app import serve as run_server
+
+        run_server(take.server_settings({"sessions": sessions, "port": port}), on_ready=open_browser)
 
 
 @app.command()
@@ -87,10 +90,24 @@ def serve(
     root: take.Roots = None,
     token: take.Token = None,
     executor: take.Executor = "local",
+    workers: take.Workers = None,
+    allow_host: take.AllowedHosts = None,
     sessions: take.Sessions = take.SESSIONS,
 ) -> None:
     """Answer the HTTP API, and the page, for a sessions folder."""
-    _serve(sessions, host=host, port=port, roots=take.named_roots(root), token=token, executor=executor)
+    from ars_web.app import serve as run_server
+
+    given = {
+        "sessions": sessions,
+        "host": host,
+        "port": port,
+        "roots": take.named_roots(root),
+        "token": token,
+        "executor": executor,
+        "workers": workers,
+        "hosts": allow_host or [],
+    }
+    run_server(take.server_settings(given))
 
 
 @app.command("import")
@@ -181,7 +198,7 @@ def export_boxes(
         return
     if file.exists() and not force:
         raise BadInput(f"{file} exists already: name another file, or replace it with --force")
-    _write_json(file, boxes)
+    write_json(file, boxes)
     note(f"{len(boxes)} boxes in {file}")
 
 
@@ -346,9 +363,8 @@ def check(sessions: take.Sessions = take.SESSIONS, as_json: take.Json = False) -
 def openapi() -> None:
     """Print the API's OpenAPI document."""
     from ars_web.app import create_app
-    from ars_web.settings import Settings
 
-    print_json(create_app(Settings(sessions=take.SESSIONS)).openapi())
+    print_json(create_app(take.server_settings({"sessions": take.SESSIONS})).openapi())
 
 
 def main() -> None:
@@ -376,12 +392,6 @@ def run(arguments: Sequence[str]) -> int:
     return status if isinstance(status, int) else 0
 
 
-def _has_screen() -> bool:
-    """Whether there is somebody to show a page to: a terminal, and a desktop to open a browser on."""
-    desktop = sys.platform == "darwin" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
-    return sys.stdin.isatty() and desktop
-
-
 def _fail(message: str) -> None:
     note("ars-web: " + " ".join(message.split("\n")))
 
@@ -391,9 +401,3 @@ def _note_skipped(skipped: Sequence["SkippedFrame"]) -> None:
         note(f"skipped {frame.name}: {frame.reason} ({frame.where})")
     if len(skipped) > SKIPPED_SHOWN:
         note(f"and {len(skipped) - SKIPPED_SHOWN} more: {len(skipped)} frames are skipped in all; --json lists them")
-
-
-def _write_json(file: Path, value: object) -> None:
-    part = file.with_name(f".{file.name}.part")
-    part.write_bytes(json_bytes(value))
-    part.replace(file)

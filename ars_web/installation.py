@@ -98,14 +98,10 @@ def _unmet(wanted: Requirement) -> str | None:
 def _page() -> Iterator[Finding]:
     from ars_web.app import static_folder
 
-    folder = static_folder()
-    page = folder / "index.html"
-    yield Finding(
-        "page",
-        page.is_file(),
-        f"{folder}" if page.is_file() else f"{page} is missing",
-        "the install is not whole: install ars-web again",
-    )
+    try:
+        yield Finding("page", True, str(static_folder()))
+    except StoreError as error:
+        yield Finding("page", False, str(error), "install ars-web again")
 
 
 def _sessions_folder(sessions: Path) -> Iterator[Finding]:

@@ -1,5 +1,6 @@
 """What the command line shows: progress, tables, JSON. Results go to stdout, everything else to stderr."""
 
+import os
 import sys
 import time
 from collections.abc import Callable, Generator, Sequence
@@ -28,6 +29,13 @@ def json_bytes(value: object) -> bytes:
 def print_json(value: object) -> None:
     """`value` as JSON on stdout."""
     sys.stdout.write(json_bytes(value).decode())
+
+
+def write_json(file: Path, value: object) -> None:
+    """`value` as JSON in a file, whole or not at all."""
+    part = file.with_name(f".{file.name}.part")
+    part.write_bytes(json_bytes(value))
+    part.replace(file)
 
 
 def _json_value(value: object) -> str:
@@ -76,3 +84,16 @@ def progress(title: str) -> Generator[OnProgress]:
             note(f"{title}: {done} of {total}")
 
     yield line
+
+
+def has_screen() -> bool:
+    """Whether there is somebody to show a page to: a terminal, and a desktop to open a browser on."""
+    desktop = sys.platform == "darwin" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+    return sys.stdin.isatty() and desktop
+
+
+def open_browser(url: str) -> None:
+    """The page at `url`, in the person's browser."""
+    import webbrowser
+
+    webbrowser.open(url)
