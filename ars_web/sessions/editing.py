@@ -198,32 +198,48 @@ class SessionEditor:
             summary = session.summary(sid)
         return summary
 
-    def undo(self, sid: str, *, author: str) -> Edit:
+    def undo(self, sid: str, *, author: str, key: str | None = None) -> Edit:
         """Take back the author's newest edit that stands, by an edit that inverts it.
+
+        A repeat with the same idempotency `key` returns what the first returned, and takes nothing back.
 
         Raises:
             NothingToUndo: there is none.
             Conflict: someone else changed the same thing since; nothing is changed.
         """
         with self._editing(sid) as session:
+            digest = request_digest("undo", author)
+            before = None if key is None else session.answered(checked_key(key), digest=digest)
+            if before is not None:
+                return before
             revision = to_undo(session.newest_entries(author=author))
             if revision is None:
                 raise NothingToUndo(f"{author!r} has nothing to undo in this session")
             edit = self._invert(sid, session, session.edit(revision), author=author, verb="Undo")
+            if key is not None:
+                session.remember(key, digest=digest)
         return edit
 
-    def redo(self, sid: str, *, author: str) -> Edit:
+    def redo(self, sid: str, *, author: str, key: str | None = None) -> Edit:
         """Make again what the author's newest undo took back, unless something new was done since.
+
+        A repeat with the same idempotency `key` returns what the first returned, and makes nothing again.
 
         Raises:
             NothingToUndo: there is no such undo.
             Conflict: someone else changed the same thing since; nothing is changed.
         """
         with self._editing(sid) as session:
+            digest = request_digest("redo", author)
+            before = None if key is None else session.answered(checked_key(key), digest=digest)
+            if before is not None:
+                return before
             revision = to_redo(session.newest_entries(author=author))
             if revision is None:
                 raise NothingToUndo(f"{author!r} has nothing to redo in this session")
             edit = self._invert(sid, session, session.edit(revision), author=author, verb="Redo")
+            if key is not None:
+                session.remember(key, digest=digest)
         return edit
 
     @contextmanager

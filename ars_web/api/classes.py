@@ -1,0 +1,63 @@
+"""`/api/sessions/{sid}/classes`: the kinds of objects."""
+
+from fastapi import APIRouter, Response
+
+from ars_web.api.dependencies import AuthorDep, ExpectedRevision, IdempotencyKey, ServicesDep, StrictRoute, etag
+from ars_web.api.models import ClassAnswer, ClassDraft, ClassPatch
+from ars_web.api.problems import documented
+from ars_web.errors import NotFound
+
+router = APIRouter(prefix="/api/sessions/{sid}/classes", tags=["classes"], route_class=StrictRoute)
+
+
+@router.get("", operation_id="classes-list", responses=documented(404))
+def classes(sid: str, response: Response, services: ServicesDep) -> list[ClassAnswer]:
+    """The session's classes, by id; the ETag is the session's revision."""
+    state = services.store.state(sid)
+    response.headers["ETag"] = etag(state.revision)
+    return [ClassAnswer.of(c) for c in state.classes.values()]
+
+
+@router.post("", status_code=201, operation_id="classes-create", responses=documented(404, 413))
+def create(
+    sid: str, draft: ClassDraft, response: Response, services: ServicesDep, author: AuthorDep, key: IdempotencyKey
+) -> ClassAnswer:
+    """Add a class."""
+    made = services.editor.add_class(sid, name=draft.name, color=draft.color, author=author, key=key)
+    response.headers["Location"] = f"/api/sessions/{sid}/classes/{made.id}"
+    response.headers["ETag"] = etag(made.revision)
+    return ClassAnswer.of(made)
+
+
+@router.get("/{class_id}", operation_id="classes-get", responses=documented(404))
+def get(sid: str, class_id: int, response: Response, services: ServicesDep) -> ClassAnswer:
+    """One class."""
+    found = services.store.state(sid).classes.get(class_id)
+    if found is None:
+        raise NotFound(f"session {sid} has no class {class_id}")
+    response.headers["ETag"] = etag(found.revision)
+    return ClassAnswer.of(found)
+
+
+@router.patch("/{class_id}", operation_id="classes-change", responses=documented(404, 412, 413, 428))
+def change(
+    sid: str,
+    class_id: int,
+    changes: ClassPatch,
+    response: Response,
+    services: ServicesDep,
+    author: AuthorDep,
+    expected: ExpectedRevision,
+) -> ClassAnswer:
+    """Change the name or the colour of a class that is at the revision in `If-Match`."""
+    after = services.editor.change_class(
+        sid, class_id, expected_revision=expected, name=changes.name, color=changes.color, author=author
+    )
+    response.headers["ETag"] = etag(after.revision)
+    return ClassAnswer.of(after)
+
+
+@router.delete("/{class_id}", status_code=204, operation_id="classes-delete", responses=documented(404, 412, 428))
+def delete(sid: str, class_id: int, services: ServicesDep, author: AuthorDep, expected: ExpectedRevision) -> None:
+    """Delete a class that no box uses and that is at the revision in `If-Match`; its id is never used again."""
+    services.editor.delete_class(sid, class_id, expected_revision=expected, author=author)

@@ -1,0 +1,122 @@
+"""What handlers are given: the server's services, who asks, and the headers that make changes safe."""
+
+from collections.abc import Callable, Coroutine, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import orjson
+from fastapi import Depends, Header, Request, Response
+from fastapi.routing import APIRoute
+
+from ars_web.api.credentials import LoginCodes
+from ars_web.api.events import EventHub
+from ars_web.api.problems import PreconditionMissing
+from ars_web.api.security import Door
+from ars_web.datasets.exports import ExportJobs
+from ars_web.errors import BadInput
+from ars_web.sessions.editing import SessionEditor
+from ars_web.sessions.store import SessionStore
+
+
+@dataclass(frozen=True)
+class Services:
+    """What one server works with, opened and closed by `app.py`.
+
+    Attributes:
+        door: who is let in.
+        codes: one-time login codes.
+        roots: folders that clients may import recordings from, links resolved, by name.
+        largest_upload: bytes of an uploaded archive.
+    """
+
+    store: SessionStore
+    editor: SessionEditor
+    exports: ExportJobs
+    events: EventHub
+    door: Door
+    codes: LoginCodes
+    roots: Mapping[str, Path]
+    largest_upload: int
+
+
+def _services(request: Request) -> Services:
+    services = request.app.state.services
+    assert isinstance(services, Services)
+    return services
+
+
+def _author(request: Request) -> str:
+    author: object = request.scope["state"]["author"]
+    assert isinstance(author, str), "the guard lets nobody else in"
+    return author
+
+
+def _expected_revision(
+    if_match: Annotated[str | None, Header(description="the ETag of the thing as it was read")] = None,
+) -> int:
+    """The revision in If-Match; -1, which nothing ever has, for any other well-formed tag."""
+    if if_match is None:
+        raise PreconditionMissing
+    tag = if_match.strip()
+    if tag == "*" or "," in tag:
+        raise BadInput('If-Match must name the one revision that you read, such as "12"')
+    digits = tag[1:-1]
+    is_revision = tag == f'"{digits}"' and digits.isascii() and digits.isdigit() and len(digits) < 16
+    return int(digits) if is_revision else -1
+
+
+def _idempotency_key(
+    idempotency_key: Annotated[
+        str | None,
+        Header(
+            min_length=1,
+            max_length=200,
+            pattern=r"^[\x20-\x7e]+$",
+            description="a repeat with the same key answers what the first answered, and does nothing",
+        ),
+    ] = None,
+) -> str | None:
+    return idempotency_key
+
+
+ServicesDep = Annotated[Services, Depends(_services)]
+AuthorDep = Annotated[str, Depends(_author)]
+ExpectedRevision = Annotated[int, Depends(_expected_revision)]
+IdempotencyKey = Annotated[str | None, Depends(_idempotency_key)]
+
+
+def etag(revision: int) -> str:
+    """The ETag of a revision."""
+    return f'"{revision}"'
+
+
+class _StrictRequest(Request):
+    async def json(self) -> Any:
+        """The body by orjson, which refuses what JSON does not have: NaN, infinities, lone surrogates."""
+        if not hasattr(self, "_strict_json"):
+            self._strict_json: Any = orjson.loads(await self.body())
+        return self._strict_json
+
+
+class StrictRoute(APIRoute):
+    """A route whose JSON bodies are JSON."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """FastAPI's handler, given a strict request."""
+        handler = super().get_route_handler()
+
+        async def strict(request: Request) -> Response:
+            return await handler(_StrictRequest(request.scope, request.receive))
+
+        return strict
+
+
+class JsonResponse(Response):
+    """A body that is JSON already, or is made so by orjson: for long lists, where models would cost more."""
+
+    media_type = "application/json"
+
+    def render(self, content: Any) -> bytes:
+        """Bytes are taken as they are."""
+        return content if isinstance(content, bytes) else orjson.dumps(content)

@@ -1,0 +1,227 @@
+"""The one place where the API, the page, the store and the export jobs are joined, opened and closed."""
+
+import importlib
+import ipaddress
+import logging
+import socket
+import sys
+from collections.abc import AsyncGenerator, Callable
+from concurrent.futures import Executor
+from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
+from importlib.resources import files
+from pathlib import Path
+
+import uvicorn
+from fastapi import FastAPI
+from starlette.concurrency import run_in_threadpool
+from starlette.staticfiles import StaticFiles
+
+from ars_web import __version__
+from ars_web.api import boxes, classes, exports, frames, health, history, login, openapi, problems, sessions
+from ars_web.api.body_limit import BodyLimit
+from ars_web.api.credentials import CODE_LIFETIME, Cookies, LoginCodes, install_token
+from ars_web.api.dependencies import Services
+from ars_web.api.events import EventHub
+from ars_web.api.security import Door, Guard
+from ars_web.datasets.exports import ExportJobs
+from ars_web.errors import BadInput, StoreError
+from ars_web.sessions.editing import SessionEditor
+from ars_web.sessions.store import SessionStore
+from ars_web.settings import Settings
+
+SHUTDOWN_SECONDS = 5
+"""How long a server that is stopped waits for answers that are being sent."""
+
+
+def create_app(settings: Settings) -> FastAPI:
+    """The application. Nothing is opened or written before its lifespan begins; all is closed when that ends."""
+    app = FastAPI(
+        title="ARS Web",
+        version=__version__,
+        lifespan=_lifespan(settings),
+        openapi_url=None,
+        docs_url=None,
+        redoc_url=None,
+        redirect_slashes=False,
+    )
+    static = static_folder()
+    problems.install(app)
+    for module in (health, sessions, classes, frames, boxes, history, exports):
+        app.include_router(module.router)
+    app.include_router(login.router(static))
+    openapi.install(app)
+    app.mount("/static", StaticFiles(directory=static), name="static")
+    # The last one added is the first to see a request.
+    app.add_middleware(BodyLimit, largest=settings.largest_body)
+    app.add_middleware(problems.Unexpected)
+    app.add_middleware(Guard, door=lambda: app.state.services.door)
+    return app
+
+
+def _lifespan(settings: Settings) -> Callable[[FastAPI], AbstractAsyncContextManager[None]]:
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncGenerator[None]:
+        make_executor = executor_factory(settings.executor)
+        token = sessions_token(settings)
+        with SessionStore(settings.sessions) as store:
+            jobs = ExportJobs(
+                settings.sessions, store.snapshot, executor_factory=make_executor, workers=settings.workers
+            )
+            try:
+                jobs.resume_unfinished()
+                editor = SessionEditor(store)
+                async with EventHub(store).running() as hub:
+                    unlisten = editor.listen(hub.wake)
+                    app.state.services = Services(
+                        store=store,
+                        editor=editor,
+                        exports=jobs,
+                        events=hub,
+                        door=Door(
+                            token=token,
+                            cookies=Cookies(token),
+                            cookie_name=f"ars_web_{settings.port}",
+                            host=settings.host,
+                            hosts=settings.hosts,
+                        ),
+                        codes=LoginCodes(),
+                        roots=settings.roots,
+                        largest_upload=settings.largest_upload,
+                    )
+                    try:
+                        yield
+                    finally:
+                        unlisten()
+            finally:
+                await run_in_threadpool(jobs.close)
+
+    return lifespan
+
+
+def sessions_token(settings: Settings) -> str:
+    """The token of the settings, else the one kept in the sessions folder, which is made where it is missing.
+
+    Raises:
+        StoreError: the folder cannot be made, or the token in it is not safe.
+    """
+    try:
+        settings.sessions.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StoreError(f"{settings.sessions}: the sessions folder cannot be made: {error.strerror}") from error
+    return settings.token or install_token(settings.sessions)
+
+
+def executor_factory(executor: str) -> Callable[[], Executor] | None:
+    """What makes the executors of exports; None: local processes.
+
+    Raises:
+        BadInput: Dask is asked for and not installed.
+    """
+    if executor == "local":
+        return None
+    try:
+        # Its name is not imported above: Dask is wanted only where a cluster is.
+        distributed = importlib.import_module("distributed")
+    except ImportError as error:
+        raise BadInput(f"the executor {executor} needs Dask: install the package `distributed`") from error
+    return lambda: distributed.Client(executor).get_executor()
+
+
+def static_folder() -> Path:
+    """Where the page's files are: in the installed package, or at the root of a checkout.
+
+    Raises:
+        StoreError: in neither.
+    """
+    package = Path(str(files("ars_web")))
+    for folder in (package / "static", package.parent / "static"):
+        if (folder / "index.html").is_file():
+            return folder
+    raise StoreError(f"{package / 'static'}: the page's files are missing; install ARS Web again")
+
+
+def serve(settings: Settings, *, on_ready: Callable[[str], None] | None = None) -> None:
+    """Serve until interrupted. Prints where, with a one-time login URL, which `on_ready` is called with, too.
+
+    Raises:
+        BadInput: the address cannot be listened on.
+        StoreError: the sessions folder or its token cannot be used.
+    """
+    token = sessions_token(settings)
+    with _listening(settings) as listener:
+        port = listener.getsockname()[1]
+        settings = settings.model_copy(update={"token": token, "port": port})
+        app = create_app(settings)
+        # No access log: the one-time code is part of an address. No proxy headers: they could be anyone's.
+        config = uvicorn.Config(
+            app,
+            log_level="warning",
+            access_log=False,
+            proxy_headers=False,
+            server_header=False,
+            timeout_graceful_shutdown=SHUTDOWN_SECONDS,
+        )
+
+        def ready() -> None:
+            base = f"http://{_shown_host(settings.host)}:{port}"
+            url = f"{base}/login?code={app.state.services.codes.issue()}"
+            _announce(settings, base, url)
+            if on_ready is not None:
+                on_ready(url)
+
+        # uvicorn raises the signal that stopped it once more, when all is closed.
+        with suppress(KeyboardInterrupt):
+            _Server(config, app, ready).run(sockets=[listener])
+
+
+class _Server(uvicorn.Server):
+    """Says when it is ready, and ends event streams before it waits for connections to close."""
+
+    def __init__(self, config: uvicorn.Config, app: FastAPI, ready: Callable[[], None]) -> None:
+        super().__init__(config)
+        self._app = app
+        self._ready = ready
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        if self.started:
+            self._ready()
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        self._app.state.services.events.close()
+        await super().shutdown(sockets)
+
+
+def _listening(settings: Settings) -> socket.socket:
+    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
+    try:
+        return socket.create_server((settings.host, settings.port), family=family, backlog=2048)
+    except OSError as error:
+        raise BadInput(
+            f"cannot listen on {settings.host}:{settings.port}: {error.strerror}; choose another host or port"
+        ) from error
+
+
+def _shown_host(host: str) -> str:
+    """A host to put into a URL: a wildcard address is reached by loopback."""
+    try:
+        address = ipaddress.ip_address(host)
+    except ValueError:
+        return host
+    if address.is_unspecified:
+        return "127.0.0.1" if address.version == 4 else "[::1]"
+    return f"[{host}]" if address.version == 6 else host
+
+
+def _announce(settings: Settings, base: str, url: str) -> None:
+    lines = [
+        f"ARS Web is at {base}/ with the sessions in {settings.sessions}",
+        f"Log in, once, within {CODE_LIFETIME // 60} minutes: {url}",
+    ]
+    sys.stdout.write("".join(f"{line}\n" for line in lines))
+    sys.stdout.flush()
+    if settings.host not in ("localhost", "::1") and not settings.host.startswith("127."):
+        logging.getLogger(__name__).warning(
+            "listening on %s: whoever can reach this machine can try the door, and nothing on the way is encrypted",
+            settings.host,
+        )

@@ -1,0 +1,52 @@
+"""Settings of one server, typed. Built by `cli.py` from its arguments, read there and in `app.py`, nowhere else."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints, field_validator
+
+RootName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$")]
+
+Executor = Annotated[str, StringConstraints(pattern=r"^(local|tls://[^\s/]+:[0-9]+)$")]
+"""`local`, or a Dask scheduler at `tls://HOST:PORT`; a plain `tcp://` one would run anyone's code."""
+
+GIB = 2**30
+MIB = 2**20
+
+
+class Settings(BaseModel):
+    """What a server is started with.
+
+    Attributes:
+        sessions: the folder that sessions, exports and the token live in; made where it is missing.
+        host: the address to listen on. Anything but a loopback address opens the server to the network.
+        port: 0 takes a free one.
+        roots: folders that clients may import recordings from, by the name they use for it.
+        hosts: further names that the server is reached by, such as a proxy's; loopback names and `host` always are.
+        token: the bearer token; None: the one kept in `<sessions>/.token`.
+        executor: where exports run.
+        workers: processes of a local export; None: one a core.
+        largest_upload: bytes of an uploaded archive.
+        largest_body: bytes of any other request's body.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    sessions: Path
+    host: str = Field("127.0.0.1", min_length=1)
+    port: int = Field(8000, ge=0, le=65535)
+    roots: dict[RootName, Path] = Field(default_factory=dict[str, Path])
+    hosts: tuple[str, ...] = ()
+    token: Annotated[str, StringConstraints(pattern=r"^[\x21-\x7e]+$")] | None = None
+    executor: Executor | Literal["local"] = "local"
+    workers: int | None = Field(None, ge=1)
+    largest_upload: int = Field(16 * GIB, ge=1)
+    largest_body: int = Field(8 * MIB, ge=1)
+
+    @field_validator("roots")
+    @classmethod
+    def _roots_are_folders(cls, roots: dict[str, Path]) -> dict[str, Path]:
+        for name, path in roots.items():
+            if not path.is_dir():
+                raise ValueError(f"root {name}={path} is not a folder")
+        return {name: path.resolve() for name, path in roots.items()}
