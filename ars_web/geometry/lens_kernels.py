@@ -1,0 +1,446 @@
+"""The compiled loops that bend shadows with a lens: the ring round a shadow in the image, and its label.
+
+Within its valid radius, the rim, a lens maps the normalised plane one-to-one, so the image of a shadow's border is the
+border of its image: everything here follows that one ring. Coordinates are image coordinates; rings run
+counter-clockwise as seen in the image, y down. Kernels call only kernels of their own file: numba's cache notices a
+change only in the file of the function that it keeps.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+Array = np.ndarray
+
+LONGEST_CURVE = 1024
+"""Points on one straight piece, however much it bends."""
+
+LONGEST_QUARTER = 1024
+"""Points on a quarter of the rim."""
+
+CAPACITY = 24_000
+"""Points of a ring: 16 pieces and five quarters, with room to spare."""
+
+FAR_TOLERANCE = 2e-5
+"""What is allowed in addition for each pixel that a curve is away from the image."""
+
+
+class Lens(NamedTuple):
+    """A camera as the kernels read it; `lens.lens_of` makes it.
+
+    Attributes:
+        fisheye: OpenCV's fisheye polynomial in the angle; else Brown's, a pinhole's being all zeros.
+        cx, cy: in image coordinates.
+        rim: the valid radius in the normalised plane.
+        rim_bend: bound on the second derivative of the rim's image by its angle, pixels.
+        bins_per_e: bins of the bend table for each factor e of the radius.
+    """
+
+    fisheye: bool
+    width: float
+    height: float
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    k1: float
+    k2: float
+    k3: float
+    k4: float
+    p1: float
+    p2: float
+    rim: float
+    rim_bend: float
+    bins_per_e: float
+
+
+@njit(error_model="numpy", forceinline=True)
+def image_point(lens: Lens, x: float, y: float) -> tuple[float, float]:
+    """Image coordinates of a point of the normalised plane within the rim (camera.pixels_from_normalised)."""
+    r2 = x * x + y * y
+    if lens.fisheye:
+        r = math.sqrt(r2)
+        theta = math.atan(r)
+        t2 = theta * theta
+        bent = theta * (1.0 + t2 * (lens.k1 + t2 * (lens.k2 + t2 * (lens.k3 + t2 * lens.k4))))
+        scale = bent / r if r > 1e-12 else 1.0
+        return lens.fx * x * scale + lens.cx, lens.fy * y * scale + lens.cy
+    radial = 1.0 + r2 * (lens.k1 + r2 * (lens.k2 + r2 * lens.k3))
+    u = x * radial + 2.0 * lens.p1 * x * y + lens.p2 * (r2 + 2.0 * x * x)
+    v = y * radial + lens.p1 * (r2 + 2.0 * y * y) + 2.0 * lens.p2 * x * y
+    return lens.fx * u + lens.cx, lens.fy * v + lens.cy
+
+
+@njit(error_model="numpy", forceinline=True)
+def bend_bin(lens: Lens, bends: Array, r: float) -> int:
+    """The bin of a radius in the bend table."""
+    last = bends.shape[1] - 1
+    if r >= lens.rim:
+        return last
+    place = last + 1 + math.log(max(r, 1e-30) / lens.rim) * lens.bins_per_e
+    return min(max(int(math.floor(place)), 0), last)
+
+
+@njit(error_model="numpy")
+def append_curve(
+    lens: Lens, bends: Array, x0: float, y0: float, x1: float, y1: float, tolerance: float, points: Array, m: int
+) -> int:
+    """Append the image of a straight piece within the rim to `points` after the first m, its start left out.
+
+    A chord over a length L is off by at most max|f''| L^2 / 8. The bound on f'' holds over a range of radii, so long
+    pieces are taken in stretches over which it is about the same.
+    """
+    dx, dy = x1 - x0, y1 - y0
+    length2 = dx * dx + dy * dy
+    nearest = -(x0 * dx + y0 * dy) / length2 if length2 > 0.0 else 0.0
+    limit = m + LONGEST_CURVE
+    s, stretch = 0.0, 1.0
+    u, v = image_point(lens, x0, y0)
+    while True:
+        s_end = s + stretch if s + stretch < 1.0 - 1e-12 else 1.0
+        x_end, y_end = (x1, y1) if s_end == 1.0 else (x0 + s_end * dx, y0 + s_end * dy)
+        u_end, v_end = image_point(lens, x_end, y_end)
+        s_near = min(max(nearest, s), s_end)
+        r_low = math.hypot(x0 + s_near * dx, y0 + s_near * dy)
+        r_high = max(math.hypot(x0 + s * dx, y0 + s * dy), math.hypot(x_end, y_end))
+        bend = min(bends[0, bend_bin(lens, bends, r_high)], bends[1, bend_bin(lens, bends, r_low)])
+        sagitta = bend * length2 * (s_end - s) ** 2 / 8.0
+        n = 1
+        if sagitta > tolerance:
+            away_u = max(min(u, u_end) - sagitta - lens.width, -max(u, u_end) - sagitta)
+            away_v = max(min(v, v_end) - sagitta - lens.height, -max(v, v_end) - sagitta)
+            n = int(min(math.ceil(math.sqrt(sagitta / (tolerance + FAR_TOLERANCE * max(away_u, away_v, 0.0)))), 1e6))
+        if n > 16 and stretch > 2e-4:
+            stretch *= 0.5
+            continue
+        n = max(min(n, limit - m), 1)
+        for i in range(1, n):
+            s_i = s + (s_end - s) * i / n
+            points[m, 0], points[m, 1] = image_point(lens, x0 + s_i * dx, y0 + s_i * dy)
+            m += 1
+        if m >= limit:
+            s_end = 1.0
+            u_end, v_end = image_point(lens, x1, y1)
+        points[m, 0], points[m, 1] = u_end, v_end
+        m += 1
+        if s_end == 1.0:
+            return m
+        s, u, v = s_end, u_end, v_end
+        stretch *= 2.0
+
+
+@njit(error_model="numpy")
+def append_arc(lens: Lens, start: float, sweep: float, tolerance: float, points: Array, m: int) -> int:
+    """Append the image of the rim from the angle `start`, `sweep` radians counter-clockwise, its start left out.
+
+    It is taken from quarter to quarter, so that the furthest points along both axes are among the samples.
+    """
+    quarter = 0.5 * math.pi
+    density = min(math.sqrt(lens.rim_bend / (8.0 * tolerance)), LONGEST_QUARTER / quarter)
+    done = 0.0
+    while done < sweep:
+        # Angles grow clockwise, y being down: the arc runs towards smaller ones.
+        angle = start - done
+        stretch = min(angle - quarter * (math.ceil(angle / quarter - 1e-9) - 1.0), sweep - done)
+        n = max(int(math.ceil(stretch * density)), 1)
+        for i in range(1, n + 1):
+            a = angle - stretch * i / n
+            points[m, 0], points[m, 1] = image_point(lens, lens.rim * math.cos(a), lens.rim * math.sin(a))
+            m += 1
+        done += max(stretch, 1e-9)
+    return m
+
+
+@njit(error_model="numpy", forceinline=True)
+def within_rim(lens: Lens, x0: float, y0: float, x1: float, y1: float) -> tuple[float, float]:
+    """The part (from, to) of a straight piece, in [0, 1], that lies within the rim; (1, 0) where none does."""
+    dx, dy = x1 - x0, y1 - y0
+    a, b, c = dx * dx + dy * dy, x0 * dx + y0 * dy, x0 * x0 + y0 * y0 - lens.rim * lens.rim
+    inside = b * b - a * c
+    if not (a > 0.0 and inside > 0.0):
+        return 1.0, 0.0
+    root = math.sqrt(inside)
+    low, high = max((-b - root) / a, 0.0), min((-b + root) / a, 1.0)
+    # A piece that only grazes the rim is none: the arc passes there, and its two ends must not be one angle.
+    cut = low > 0.0 or high < 1.0
+    if not low < high or (cut and (high - low) * (high - low) * a < 1e-14 * lens.rim * lens.rim):
+        return 1.0, 0.0
+    return low, high
+
+
+@njit(error_model="numpy")
+def outline_ring(lens: Lens, bends: Array, xy: Array, n: int, tolerance: float, points: Array) -> int:
+    """The image of a convex polygon cut to the rim, as a ring written to `points`; how many, 0 for none."""
+    m = 0
+    last_x, last_y, last_cut = 0.0, 0.0, False
+    first_x, first_y, first_cut = 0.0, 0.0, False
+    for i in range(n):
+        j = i + 1 if i + 1 < n else 0
+        x0, y0, x1, y1 = xy[i, 0], xy[i, 1], xy[j, 0], xy[j, 1]
+        low, high = within_rim(lens, x0, y0, x1, y1)
+        if low > high:
+            continue
+        xs, ys = x0 + low * (x1 - x0), y0 + low * (y1 - y0)
+        xe, ye = x0 + high * (x1 - x0), y0 + high * (y1 - y0)
+        if m == 0:
+            first_x, first_y, first_cut = xs, ys, low > 0.0
+            points[0, 0], points[0, 1] = image_point(lens, xs, ys)
+            m = 1
+        elif low > 0.0 or last_cut:
+            m = append_arc_between(lens, last_x, last_y, xs, ys, tolerance, points, m)
+        m = append_curve(lens, bends, xs, ys, xe, ye, tolerance, points, m)
+        last_x, last_y, last_cut = xe, ye, high < 1.0
+    if m == 0:
+        return append_arc(lens, 0.0, 2.0 * math.pi, tolerance, points, 0) if holds(xy, n, 0.0, 0.0) else 0
+    if first_cut or last_cut:
+        m = append_arc_between(lens, last_x, last_y, first_x, first_y, tolerance, points, m)
+    return m - 1  # the last point is the first again
+
+
+@njit(error_model="numpy")
+def append_arc_between(
+    lens: Lens, x0: float, y0: float, x1: float, y1: float, tolerance: float, points: Array, m: int
+) -> int:
+    """Append the image of the rim, counter-clockwise from where one piece left it to where the next one enters."""
+    start = math.atan2(y0, x0)
+    sweep = (start - math.atan2(y1, x1)) % (2.0 * math.pi)
+    # Two pieces that meet on the rim leave a sweep of nothing, which rounding may turn into a whole round.
+    if sweep > 2.0 * math.pi - 1e-8:
+        sweep = 0.0
+    m = append_arc(lens, start, sweep, tolerance, points, m)
+    points[m, 0], points[m, 1] = image_point(lens, x1, y1)
+    return m + 1
+
+
+@njit(error_model="numpy")
+def holds(xy: Array, n: int, x: float, y: float) -> bool:
+    """Whether a convex polygon holds a point; NaN it does not."""
+    for i in range(n):
+        j = i + 1 if i + 1 < n else 0
+        if not (xy[j, 0] - xy[i, 0]) * (y - xy[i, 1]) - (xy[j, 1] - xy[i, 1]) * (x - xy[i, 0]) <= 0.0:
+            return False
+    return True
+
+
+@njit(error_model="numpy", forceinline=True)
+def in_image(lens: Lens, u0: float, v0: float, u1: float, v1: float) -> tuple[float, float]:
+    """The part (from, to) of a straight piece, in [0, 1], that lies in the image; (1, 0) where none does."""
+    low, high = 0.0, 1.0
+    for axis in range(2):
+        start, along, side = (u0, u1 - u0, lens.width) if axis == 0 else (v0, v1 - v0, lens.height)
+        if along == 0.0:
+            if not 0.0 <= start <= side:
+                return 1.0, 0.0
+        else:
+            a, b = -start / along, (side - start) / along
+            low, high = max(low, min(a, b)), min(high, max(a, b))
+    return (low, high) if low <= high else (1.0, 0.0)
+
+
+@njit(error_model="numpy", forceinline=True)
+def clamped_integral(v: float, height: float) -> float:
+    """Integral of min(max(v, 0), height) from 0 to v."""
+    return 0.0 if v <= 0.0 else (0.5 * v * v if v <= height else height * (v - 0.5 * height))
+
+
+@njit(error_model="numpy", forceinline=True)
+def area_in_image(lens: Lens, u0: float, v0: float, u1: float, v1: float) -> float:
+    """What one side of a ring adds to the area of the ring within the image: the integral of v, clamped to the
+    image's height, over the part of u within its width. Its sum over any ring is the signed area."""
+    if u0 == u1 or (u0 <= 0.0 and u1 <= 0.0) or (u0 >= lens.width and u1 >= lens.width):
+        return 0.0
+    slope = (v1 - v0) / (u1 - u0)
+    ua, ub = min(max(u0, 0.0), lens.width), min(max(u1, 0.0), lens.width)
+    va, vb = v0 + slope * (ua - u0), v0 + slope * (ub - u0)
+    if 0.0 <= va <= lens.height and 0.0 <= vb <= lens.height:
+        return 0.5 * (va + vb) * (ub - ua)
+    if abs(vb - va) < 1e-9:
+        return min(max(va, 0.0), lens.height) * (ub - ua)
+    return (clamped_integral(vb, lens.height) - clamped_integral(va, lens.height)) / (vb - va) * (ub - ua)
+
+
+@njit(error_model="numpy", forceinline=True)
+def place_in_image(lens: Lens, u: float, v: float) -> tuple[float, float]:
+    """A point of the image without what rounding put beyond its borders."""
+    return min(max(u, 0.0), lens.width), min(max(v, 0.0), lens.height)
+
+
+@njit(error_model="numpy", forceinline=True)
+def start_bbox(bbox: Array) -> None:
+    """A box of nothing."""
+    bbox[0], bbox[1], bbox[2], bbox[3] = np.inf, np.inf, -np.inf, -np.inf
+
+
+@njit(error_model="numpy", forceinline=True)
+def grow_bbox(bbox: Array, u: float, v: float) -> None:
+    """Make a box hold a point."""
+    bbox[0], bbox[1] = min(bbox[0], u), min(bbox[1], v)
+    bbox[2], bbox[3] = max(bbox[2], u), max(bbox[3], v)
+
+
+@njit(error_model="numpy")
+def amodal_bbox(lens: Lens, bends: Array, xy: Array, n: int, tolerance: float, points: Array, bbox: Array) -> bool:
+    """The box of a polygon's image without sampling what cannot extend it; False where the rim cuts the polygon.
+
+    Along a piece with ends du apart and a sagitta s, u goes beyond its ends by at most s (1 - |du| / 4s)^2, and not
+    at all where |du| >= 4 s.
+    """
+    r2 = 0.0
+    for i in range(n):
+        r2 = max(r2, xy[i, 0] * xy[i, 0] + xy[i, 1] * xy[i, 1])
+    if not r2 < lens.rim * lens.rim:
+        return False
+    start_bbox(bbox)
+    for i in range(n):
+        u, v = image_point(lens, xy[i, 0], xy[i, 1])
+        points[i, 0], points[i, 1] = u, v
+        grow_bbox(bbox, u, v)
+    bend = bends[0, bend_bin(lens, bends, math.sqrt(r2))]
+    slack = 0.5 * tolerance
+    for i in range(n):
+        j = i + 1 if i + 1 < n else 0
+        sagitta = bend * ((xy[j, 0] - xy[i, 0]) ** 2 + (xy[j, 1] - xy[i, 1]) ** 2) / 8.0
+        if sagitta <= slack:
+            continue
+        beyond_u = sagitta * max(1.0 - abs(points[j, 0] - points[i, 0]) / (4.0 * sagitta), 0.0) ** 2 - slack
+        beyond_v = sagitta * max(1.0 - abs(points[j, 1] - points[i, 1]) / (4.0 * sagitta), 0.0) ** 2 - slack
+        if (
+            min(points[i, 0], points[j, 0]) - beyond_u < bbox[0]
+            or max(points[i, 0], points[j, 0]) + beyond_u > bbox[2]
+            or min(points[i, 1], points[j, 1]) - beyond_v < bbox[1]
+            or max(points[i, 1], points[j, 1]) + beyond_v > bbox[3]
+        ):
+            m = append_curve(lens, bends, xy[i, 0], xy[i, 1], xy[j, 0], xy[j, 1], slack, points, n)
+            for k in range(n, m):
+                grow_bbox(bbox, points[k, 0], points[k, 1])
+    return True
+
+
+@njit(error_model="numpy")
+def label_of_ring(lens: Lens, image_corners: Array, xy: Array, n: int, points: Array, m: int, bbox: Array) -> float:
+    """The box of the part of a ring's inside that lies in the image, written to `bbox`, and the share of its area
+    that does not. `xy` is the polygon whose image the ring is; image corners that it holds are corners of the part."""
+    start_bbox(bbox)
+    whole, part = 0.0, 0.0
+    for i in range(m):
+        j = i + 1 if i + 1 < m else 0
+        u0, v0, u1, v1 = points[i, 0], points[i, 1], points[j, 0], points[j, 1]
+        whole += 0.5 * (v0 + v1) * (u1 - u0)
+        part += area_in_image(lens, u0, v0, u1, v1)
+        low, high = in_image(lens, u0, v0, u1, v1)
+        if low <= high:
+            for s in (low, high):
+                grow_bbox(bbox, u0 + s * (u1 - u0), v0 + s * (v1 - v0))
+    for i in range(4):
+        if holds(xy, n, image_corners[i, 0], image_corners[i, 1]):
+            grow_bbox(bbox, lens.width * (i % 2), lens.height * (i // 2))
+    bbox[0], bbox[1] = max(bbox[0], 0.0), max(bbox[1], 0.0)
+    bbox[2], bbox[3] = min(bbox[2], lens.width), min(bbox[3], lens.height)
+    if not (bbox[0] < bbox[2] and bbox[1] < bbox[3]):
+        bbox[:] = np.nan
+        return 1.0
+    return min(max(1.0 - part / whole, 0.0), 1.0) if whole != 0.0 else 0.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def label_shadows(
+    lens: Lens,
+    bends: Array,
+    image_corners: Array,
+    polygons: Array,
+    corners: Array,
+    tolerance: float,
+    bbox: Array,
+    bbox_amodal: Array,
+    truncated: Array,
+) -> None:
+    """Labels of n x b shadows, written to `bbox` and `bbox_amodal` (n, b, 4) and `truncated` (n, b).
+
+    `image_corners` (4, 2): the image's corners (0, 0), (W, 0), (0, H), (W, H) in the normalised plane, NaN where no
+    ray of the lens ends in one.
+    """
+    points = np.empty((CAPACITY, 2))
+    for frame in range(corners.shape[0]):
+        for box in range(corners.shape[1]):
+            part, whole = bbox[frame, box], bbox_amodal[frame, box]
+            part[:], whole[:], truncated[frame, box] = np.nan, np.nan, 1.0
+            xy, n = polygons[frame, box], corners[frame, box]
+            if n == 0:
+                continue
+            if amodal_bbox(lens, bends, xy, n, tolerance, points, whole):
+                if whole[0] >= lens.width or whole[1] >= lens.height or whole[2] <= 0.0 or whole[3] <= 0.0:
+                    continue
+                if whole[0] >= 0.0 and whole[1] >= 0.0 and whole[2] <= lens.width and whole[3] <= lens.height:
+                    if whole[0] < whole[2] and whole[1] < whole[3]:
+                        part[:], truncated[frame, box] = whole, 0.0
+                    continue
+            m = outline_ring(lens, bends, xy, n, tolerance, points)
+            if m < 3:
+                continue
+            start_bbox(whole)
+            for i in range(m):
+                grow_bbox(whole, points[i, 0], points[i, 1])
+            truncated[frame, box] = label_of_ring(lens, image_corners, xy, n, points, m, part)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def rings_of_shadows(
+    lens: Lens, bends: Array, polygons: Array, corners: Array, wanted: Array, tolerance: float
+) -> tuple[Array, Array]:
+    """Rings round n x b shadows, those that are `wanted` (n, b): all points (k, 2), and (n * b,) how many each has."""
+    frames, boxes = corners.shape
+    lengths = np.zeros(frames * boxes, np.int64)
+    ring = np.empty((CAPACITY, 2))
+    found = np.empty((64 * frames * boxes, 2))
+    k = 0
+    for frame in range(frames):
+        for box in range(boxes):
+            if not wanted[frame, box] or corners[frame, box] == 0:
+                continue
+            m = outline_ring(lens, bends, polygons[frame, box], corners[frame, box], tolerance, ring)
+            if k + m > len(found):
+                grown = np.empty((2 * len(found) + m, 2))
+                grown[:k] = found[:k]
+                found = grown
+            found[k : k + m] = ring[:m]
+            lengths[frame * boxes + box] = m
+            k += m
+    return found[:k].copy(), lengths
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def curves_of_edges(lens: Lens, bends: Array, edges: Array, tolerance: float) -> tuple[Array, Array]:
+    """Images of straight pieces (n, 2, 2), cut to the rim and the image: all points (k, 2), and how many each curve
+    has; a piece gives no curve, one, or more where the lens bends it out of the image and back."""
+    curve = np.empty((CAPACITY, 2))
+    found = np.empty((2 * CAPACITY, 2))
+    lengths = np.zeros(2 * CAPACITY, np.int64)
+    k, curves = 0, 0
+    for edge in range(len(edges)):
+        x0, y0, x1, y1 = edges[edge, 0, 0], edges[edge, 0, 1], edges[edge, 1, 0], edges[edge, 1, 1]
+        low, high = within_rim(lens, x0, y0, x1, y1)
+        if low > high:
+            continue
+        xs, ys, xe, ye = x0 + low * (x1 - x0), y0 + low * (y1 - y0), x0 + high * (x1 - x0), y0 + high * (y1 - y0)
+        curve[0, 0], curve[0, 1] = image_point(lens, xs, ys)
+        m = append_curve(lens, bends, xs, ys, xe, ye, tolerance, curve, 1)
+        joined = False
+        for i in range(m - 1):
+            u, v = curve[i, 0], curve[i, 1]
+            du, dv = curve[i + 1, 0] - u, curve[i + 1, 1] - v
+            start, end = in_image(lens, u, v, u + du, v + dv)
+            if start >= end:
+                joined = False
+                continue
+            if not joined or start > 0.0:
+                found[k, 0], found[k, 1] = place_in_image(lens, u + start * du, v + start * dv)
+                lengths[curves] = 1
+                curves += 1
+                k += 1
+            found[k, 0], found[k, 1] = place_in_image(lens, u + end * du, v + end * dv)
+            lengths[curves - 1] += 1
+            k += 1
+            joined = end == 1.0
+    return found[:k].copy(), lengths[:curves].copy()
