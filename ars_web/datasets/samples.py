@@ -113,14 +113,24 @@ def outlines_in_frames(
     wanted: Bool[np.ndarray, "n b"],
 ) -> Outlines:
     """Outlines of the boxes in the frames where they are wanted."""
-    rings: list[Float[np.ndarray, "k 2"]] = [np.zeros((0, 2))]
-    lengths = np.zeros(wanted.size + 1, dtype=np.int64)
-    for flat in np.flatnonzero(wanted).tolist():
-        row, column = divmod(flat, len(boxes))
-        ring = geometry.outline(cameras[int(camera_ids[row])], Ts_world_camera[row], boxes[column])
-        rings.append(ring)
-        lengths[flat + 1] = len(ring)
-    return Outlines(np.concatenate(rings), np.cumsum(lengths))
+    if not wanted.any():
+        return Outlines(np.zeros((0, 2)), np.zeros(wanted.size + 1, dtype=np.int64))
+    lengths = np.zeros(wanted.shape, dtype=np.int64)
+    of_rows: list[tuple[Int[np.ndarray, "m"], Float[np.ndarray, "k 2"]]] = []
+    for camera, rows in _by_camera(cameras, camera_ids):
+        points, starts = geometry.outlines(camera, Ts_world_camera[rows], boxes, wanted[rows])
+        lengths[rows] = np.diff(starts).reshape(len(rows), len(boxes))
+        of_rows.append((rows, points))
+    starts = np.concatenate([[0], np.cumsum(lengths)])
+    joined = np.empty((starts[-1], 2))
+    begins = starts[:: len(boxes)]
+    for rows, points in of_rows:
+        taken = 0
+        for row in rows.tolist():
+            ring_points = int(lengths[row].sum())
+            joined[begins[row] : begins[row] + ring_points] = points[taken : taken + ring_points]
+            taken += ring_points
+    return Outlines(joined, starts)
 
 
 def label_table(snapshot: SessionSnapshot, indices: Sequence[int], *, step: int = 8) -> LabelTable:
