@@ -2,6 +2,7 @@
 
 import os
 import sqlite3
+import threading
 from contextlib import closing
 from pathlib import Path
 
@@ -15,6 +16,8 @@ SCHEMA = "0002"
 """The newest step under `migrations/versions`. A constant, so that opening a session does not load Alembic."""
 
 SCRIPTS = Path(__file__).parent / "migrations"
+
+_ALEMBIC = threading.Lock()
 
 
 def bring_up_to_date(path: Path, *, scripts: Path = SCRIPTS, target: str = SCHEMA) -> None:
@@ -89,7 +92,9 @@ def _run_steps(connection: Connection, scripts: Path, target: str) -> None:
     # Alembic's options are ini values: a % in a path would be read as the start of a reference.
     config.set_main_option("script_location", str(scripts).replace("%", "%%"))
     config.set_main_option("path_separator", "os")
-    command.upgrade(config, target)
+    # Alembic keeps what it is doing in a module's globals: one thread at a time.
+    with _ALEMBIC:
+        command.upgrade(config, target)
 
 
 def _refuse_newer(found: str, path: Path, scripts: Path) -> None:

@@ -22,6 +22,7 @@ from ars_web.sessions.edits import Edit, apply
 from ars_web.sessions.importing import fill, starting_state
 from ars_web.sessions.migration import back_up
 from ars_web.sessions.model import FrameTable, SessionSnapshot, SessionState, SessionSummary
+from ars_web.sessions.names import checked_key
 from ars_web.sessions.transaction import SessionTransaction
 
 log = logging.getLogger(__name__)
@@ -84,7 +85,7 @@ class SessionStore:
             StoreError: the folder cannot be written.
         """
         state = starting_state(recording, name=name, class_names=class_names)
-        sid = session_folders.new_id(key=key)
+        sid = session_folders.new_id(key=None if key is None else checked_key(key))
         if key is not None and session_folders.is_put_away(self.folder, sid):
             raise BadInput(f"the idempotency key {key!r} made session {sid}, which was deleted since; use another key")
         if key is None or sid not in session_folders.session_ids(self.folder):

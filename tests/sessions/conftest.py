@@ -1,0 +1,68 @@
+"""Small recordings made by hand, and a store of their sessions."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ars_web.geometry import rigid_transform
+from ars_web.geometry.box import Box
+from ars_web.geometry.camera import Camera
+from ars_web.recordings.recording import Frame, Recording
+from ars_web.sessions.editing import SessionEditor
+from ars_web.sessions.store import SessionStore
+
+MakeRecording = Callable[..., Recording]
+
+
+@pytest.fixture
+def make_recording(tmp_path: Path) -> MakeRecording:
+    """A recording of `frames` frames on a circle; with `images`, there are files where it says."""
+
+    def make(frames: int = 3, *, images: bool = False, **more: object) -> Recording:
+        source = tmp_path / "recording"
+        listed: list[Frame] = []
+        for i in range(frames):
+            name = f"cam{i % 2}/{i:05d}.jpg"
+            path = source / "images" / name
+            if images:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(b"image %d" % i * 50)
+            T = rigid_transform.from_rotation(
+                rigid_transform.rotation_about_z(0.1 * i), np.array([np.cos(i), np.sin(i), 0.5])
+            )
+            listed.append(Frame(name, path, i % 2, T))
+        cameras = {
+            0: Camera(640, 480, 500.1, 500.2, 319.5, 239.5),
+            1: Camera(320, 240, 250.0, 250.0, 159.5, 119.5, "brown", (0.1, -0.2, 1e-3, 2e-3, 0.3)),
+        }
+        return Recording("ars", source, cameras, tuple(listed), **{"class_names": ("cube",), **more})  # pyright: ignore
+
+    return make
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Iterator[SessionStore]:
+    with SessionStore(tmp_path / "sessions") as store:
+        yield store
+
+
+@pytest.fixture
+def editor(store: SessionStore) -> SessionEditor:
+    return SessionEditor(store)
+
+
+@pytest.fixture
+def sid(store: SessionStore, make_recording: MakeRecording) -> str:
+    """A session of three frames with one class, `cube`, of id 0."""
+    return store.create(make_recording(), name="table").id
+
+
+@pytest.fixture
+def a_box() -> Callable[..., Box]:
+    def make(x: float = 0.0, size: float = 0.1) -> Box:
+        R = rigid_transform.rotation_about_z(0.3 + x)
+        return Box(rigid_transform.from_rotation(R, np.array([x, 0.2, 0.3])), np.array([size, 0.2, 0.3]))
+
+    return make
