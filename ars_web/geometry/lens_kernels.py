@@ -80,7 +80,7 @@ def bend_bin(lens: Lens, bends: Array, r: float) -> int:
     if r >= lens.rim:
         return last
     place = last + 1 + math.log(max(r, 1e-30) / lens.rim) * lens.bins_per_e
-    return min(max(int(math.floor(place)), 0), last)
+    return min(max(math.floor(place), 0), last)
 
 
 @njit(error_model="numpy")
@@ -144,7 +144,7 @@ def append_arc(lens: Lens, start: float, sweep: float, tolerance: float, points:
         # Angles grow clockwise, y being down: the arc runs towards smaller ones.
         angle = start - done
         stretch = min(angle - quarter * (math.ceil(angle / quarter - 1e-9) - 1.0), sweep - done)
-        n = max(int(math.ceil(stretch * density)), 1)
+        n = max(math.ceil(stretch * density), 1)
         for i in range(1, n + 1):
             a = angle - stretch * i / n
             points[m, 0], points[m, 1] = image_point(lens, lens.rim * math.cos(a), lens.rim * math.sin(a))
