@@ -35,6 +35,15 @@ class BadFile(BadInput):
         super().__init__(f"{where}: {message}")
         self.path = Path(path)
         self.line = line
+        self._message = message
+
+    def __reduce__(self) -> tuple[object, ...]:
+        # Exceptions are pickled with their args, which are not this one's: a pool's worker could not raise it.
+        return _bad_file, (self.path, self._message, self.line)
+
+
+def _bad_file(path: Path, message: str, line: int | None) -> BadFile:
+    return BadFile(path, message, line=line)
 
 
 class NotFound(ArsError):

@@ -116,20 +116,18 @@ def outlines_in_frames(
     if not wanted.any():
         return Outlines(np.zeros((0, 2)), np.zeros(wanted.size + 1, dtype=np.int64))
     lengths = np.zeros(wanted.shape, dtype=np.int64)
-    of_rows: list[tuple[Int[np.ndarray, "m"], Float[np.ndarray, "k 2"]]] = []
-    for camera, rows in _by_camera(cameras, camera_ids):
-        points, starts = geometry.outlines(camera, Ts_world_camera[rows], boxes, wanted[rows])
-        lengths[rows] = np.diff(starts).reshape(len(rows), len(boxes))
-        of_rows.append((rows, points))
+    found = [
+        (rows, *geometry.outlines(camera, Ts_world_camera[rows], boxes, wanted[rows]))
+        for camera, rows in _by_camera(cameras, camera_ids)
+    ]
+    for rows, _, offsets in found:
+        lengths[rows] = np.diff(offsets).reshape(len(rows), len(boxes))
     starts = np.concatenate([[0], np.cumsum(lengths)])
     joined = np.empty((starts[-1], 2))
-    begins = starts[:: len(boxes)]
-    for rows, points in of_rows:
-        taken = 0
-        for row in rows.tolist():
-            ring_points = int(lengths[row].sum())
-            joined[begins[row] : begins[row] + ring_points] = points[taken : taken + ring_points]
-            taken += ring_points
+    for rows, points, offsets in found:
+        for i, row in enumerate(rows.tolist()):
+            first, last = len(boxes) * row, len(boxes) * (row + 1)
+            joined[starts[first] : starts[last]] = points[offsets[len(boxes) * i] : offsets[len(boxes) * (i + 1)]]
     return Outlines(joined, starts)
 
 

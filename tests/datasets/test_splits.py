@@ -1,0 +1,79 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ars_web.datasets.options import SplitChoice
+from ars_web.datasets.splits import BLOCKS, apportion, assign
+from ars_web.errors import BadInput
+
+
+def runs(splits: np.ndarray) -> int:
+    return int((np.diff(splits) != 0).sum()) + 1
+
+
+def test_blocks_are_contiguous_runs_that_meet_the_shares() -> None:
+    splits = assign([3000], SplitChoice(train=0.7, val=0.2, test=0.1))
+    assert np.bincount(splits).tolist() == [2100, 600, 300]
+    assert runs(splits) <= BLOCKS
+    edges = np.flatnonzero(np.diff(splits)) + 1
+    assert (edges % (3000 // BLOCKS) == 0).all()
+
+
+def test_frames_are_dealt_one_by_one() -> None:
+    splits = assign([1000], SplitChoice(by="frame"))
+    assert np.bincount(splits).tolist() == [800, 200]
+    assert runs(splits) > 200
+
+
+def test_sessions_are_dealt_whole() -> None:
+    splits = assign([10, 20, 30, 40, 50], SplitChoice(by="session"))
+    starts = np.cumsum([0, 10, 20, 30, 40, 50])
+    of_session = [set(splits[a:b].tolist()) for a, b in pairwise(starts.tolist())]
+    assert all(len(found) == 1 for found in of_session)
+    assert sorted(min(found) for found in of_session) == [0, 0, 0, 0, 1]
+
+
+def test_too_few_sessions_for_the_splits_are_refused() -> None:
+    with pytest.raises(BadInput, match=r"each of train, val.*this export has 1"):
+        assign([100], SplitChoice(by="session"))
+
+
+def test_the_seed_decides_and_nothing_else() -> None:
+    one, two = SplitChoice(seed=1), SplitChoice(seed=2)
+    assert (assign([500], one) == assign([500], one)).all()
+    assert (assign([500], one) != assign([500], two)).any()
+
+
+def test_the_choice_is_the_same_on_every_machine() -> None:
+    assert np.flatnonzero(assign([10], SplitChoice(by="frame"))).tolist() == [3, 9]
+
+
+@pytest.mark.parametrize("by", ["block", "frame"])
+def test_a_share_of_zero_gets_nothing_and_a_single_frame_trains(by: str) -> None:
+    assert not assign([97], SplitChoice.model_validate({"train": 1.0, "val": 0.0, "by": by})).any()
+    assert assign([1], SplitChoice.model_validate({"by": by})).tolist() == [0]
+    assert assign([0], SplitChoice.model_validate({"by": by})).tolist() == []
+    assert (assign([7], SplitChoice.model_validate({"train": 0.0, "val": 1.0, "by": by})) == 1).all()
+
+
+def test_every_merged_session_is_divided_by_itself() -> None:
+    splits = assign([100, 50], SplitChoice())
+    assert splits[:100].sum() == 20
+    assert splits[100:].sum() == 10
+
+
+@given(units=st.integers(0, 500), cuts=st.tuples(st.integers(0, 100), st.integers(0, 100)))
+def test_apportioning_gives_every_unit_away_once(units: int, cuts: tuple[int, int]) -> None:
+    low, high = sorted(cuts)
+    shares = [low / 100, (high - low) / 100, (100 - high) / 100]
+    counts = apportion(units, shares)
+    positive = sum(share > 0 for share in shares)
+    assert sum(counts) == units
+    assert min(counts) >= 0
+    for count, share in zip(counts, shares, strict=True):
+        assert (count == 0) if share == 0 else abs(count - share * units) <= positive
+        if share > 0 and units >= positive:
+            assert count >= 1
