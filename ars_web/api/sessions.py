@@ -73,7 +73,7 @@ def change(
     if changes.name is None:
         summary = services.store.summary(sid)
         if summary.revision != expected:
-            raise Conflict(f"the session is at revision {summary.revision}", current=summary)
+            raise Conflict(f"the session is at revision {summary.revision}, not {expected}", current=summary)
     else:
         summary = services.editor.rename(sid, name=changes.name, expected_revision=expected, author=author)
     response.headers["ETag"] = etag(summary.revision)
@@ -85,10 +85,7 @@ def change(
 )
 def delete(sid: str, services: ServicesDep, expected: ExpectedRevision) -> None:
     """Put a session that is at the revision in `If-Match` into the trash; `restore` brings it back."""
-    summary = services.store.summary(sid)
-    if summary.revision != expected:
-        raise Conflict(f"the session is at revision {summary.revision}", current=summary)
-    services.store.delete(sid)
+    services.store.delete(sid, expected_revision=expected)
 
 
 @router.post("/api/sessions/{sid}/restore", operation_id="sessions-restore", responses=documented(404))

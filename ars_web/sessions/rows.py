@@ -196,7 +196,7 @@ def insert_recording(
             {
                 "idx": start + i,
                 "name": frame.name,
-                "image": None if copied else str(frame.image),
+                "image": None if copied else str(_unlinked(frame.image)),
                 "camera_id": frame.camera_id,
                 "pose": _pose_bytes(frame.T_world_camera),
             }
@@ -212,6 +212,14 @@ def insert_recording(
     )
     _insert_all(connection, tables.object_class, [_class_row(c) for c in state.classes.values()])
     _insert_all(connection, tables.box, [_box_row(b) for b in state.boxes.values()])
+
+
+def _unlinked(image: Path) -> Path:
+    """Where the image lies: a link is followed now, so that whoever changes it later shows nothing else here.
+
+    Readers have followed the links to its folder already.
+    """
+    return image.resolve() if image.is_symlink() else image
 
 
 def append_edit(connection: Connection, edit: Edit, state: SessionState) -> None:

@@ -12,7 +12,7 @@ from typing import Self
 
 from sqlalchemy import Connection
 
-from ars_web.errors import ArsError, BadInput, NotFound, StoreError
+from ars_web.errors import ArsError, BadInput, Conflict, NotFound, StoreError
 from ars_web.geometry.camera import Camera
 from ars_web.recordings.recording import Recording, SkippedFrame
 from ars_web.sessions import rows, session_folders
@@ -194,9 +194,18 @@ class SessionStore:
                 frames=self._frames(sid, connection, session),
             )
 
-    def delete(self, sid: str) -> None:
-        """Move the session to the trash, once the edits that are being written are done."""
-        with self.writing(sid):
+    def delete(self, sid: str, *, expected_revision: int | None = None) -> None:
+        """Move the session to the trash, once the edits that are being written are done.
+
+        Raises:
+            Conflict: it is not at `expected_revision`; `current` is its summary.
+        """
+        with self.writing(sid) as session:
+            if expected_revision not in (None, session.state.revision):
+                raise Conflict(
+                    f"the session is at revision {session.state.revision}, not {expected_revision}",
+                    current=session.summary(sid),
+                )
             session_folders.put_away(self.folder, sid)
         self._forget(sid)
 
