@@ -132,7 +132,9 @@ changes = st.one_of(
 def alike(a: Change, b: Change) -> bool:
     if isinstance(a, BoxChange) and isinstance(b, BoxChange):
         revisions = [c and c.revision for c in (a.before, a.after)] == [c and c.revision for c in (b.before, b.after)]
-        return a.box_id == b.box_id and revisions and same_content(a.before, b.before) and same_content(a.after, b.after)
+        return (
+            a.box_id == b.box_id and revisions and same_content(a.before, b.before) and same_content(a.after, b.after)
+        )
     return a == b
 
 

@@ -163,8 +163,6 @@ def test_a_deleted_session_can_be_restored(store: SessionStore, editor: SessionE
     store.restore(sid)
     assert differences(store.state(sid), before) == []
     editor.add_box(sid, class_id=0, box=a_box(), author="me")
-    assert store.check() == ["session %s: 3 images are not where they were, the first is %s: bring them back, or import"
-                             " the recording again with --copy" % (sid, store.frames(sid).images[0])]  # fmt: skip
     with pytest.raises(NotFound):
         store.restore(sid)
 
@@ -182,9 +180,7 @@ def test_an_edit_never_goes_to_a_session_that_another_process_deleted(store: Ses
         assert editor.add_box(sid, class_id=0, box=a_box(), author="me").revision == 2
 
 
-def test_a_writer_that_waits_while_the_session_is_deleted_writes_nothing(
-    store: SessionStore, sid: str, a_box: MakeBox
-):
+def test_a_writer_that_waits_while_the_session_is_deleted_writes_nothing(store: SessionStore, sid: str, a_box: MakeBox):
     with SessionStore(store.folder) as other:
         other.state(sid)
         outcome: list[Exception | None] = []
@@ -340,6 +336,12 @@ def test_a_folder_that_cannot_be_is_a_store_error(tmp_path: Path, make_recording
         assert not (tmp_path / "absent").exists()
 
 
+def add_until_refused(editor: SessionEditor, sid: str, a_box: MakeBox) -> None:
+    """The pages that the database has already are filled first."""
+    for _ in range(200):
+        editor.add_box(sid, class_id=0, box=a_box(), name="x" * 90, author="me")
+
+
 @pytest.mark.parametrize(
     ("pragma", "message"),
     [
@@ -359,8 +361,7 @@ def test_a_full_disk_or_a_read_only_one_keeps_nothing_of_the_change(
     event.listen(Engine, "connect", limit)
     try:
         with pytest.raises(StoreError, match=message):
-            for i in range(200):  # until the pages that are there already are full
-                editor.add_box(sid, class_id=0, box=a_box(), name=f"{i}" + "x" * 90, author="me")
+            add_until_refused(editor, sid, a_box)
     finally:
         event.remove(Engine, "connect", limit)
     store.close()
