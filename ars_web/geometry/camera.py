@@ -211,7 +211,7 @@ def _undistorted_radius(camera: Camera, r_d: Float[np.ndarray, "*n"]) -> Float[n
         below = radius(middle) < r_d
         low, high = np.where(below, middle, low), np.where(below, high, middle)
     r = 0.5 * (low + high)
-    r = np.where(r_d <= radius(np.asarray(rim)), r, np.nan)
+    r = np.where(r_d <= radius(np.full_like(r_d, rim)), r, np.nan)
     return np.tan(r) if camera.model == "fisheye" else r
 
 
