@@ -189,6 +189,8 @@ def _refused(error: "ValidationError") -> typer.BadParameter:
     fault = error.errors()[0]
     names = [part for part in fault["loc"] if isinstance(part, str)]
     option = SPELLED_DIFFERENTLY.get(names[0], "--" + "-".join(names).replace("_", "-")) if names else None
+    if names == ["split"]:
+        option = "--split-train, --split-val, --split-test"
     message = fault["msg"].removeprefix("Value error, ")
     given = "" if isinstance(fault["input"], dict) else f", not {fault['input']}"
     return typer.BadParameter(f"{message}{given}", param_hint=option)
