@@ -39,6 +39,8 @@ def read(path: Path, options: ReadOptions) -> Recording:
     """
     folder = _model_folder(path)
     model = _read_model(folder, options)
+    if not model.images:
+        raise BadFile(model.images_file, "lists no image")
     poses = poses_of(model)
     order = sorted(range(len(model.images)), key=lambda row: natural_key(model.images[row].name))
     images = [model.images[row] for row in order]

@@ -1,5 +1,6 @@
 """Image folders whose images belong to poses by their place in the sorted list."""
 
+import os
 import re
 from pathlib import Path
 
@@ -8,6 +9,7 @@ from ars_web.errors import BadFile
 # Lower and upper case, but one kind of image: the first kind that is there is the recording, as in the original tool.
 _KINDS = ((".jpg", ".jpeg"), (".png",))
 
+_ANY_DIGIT = str.maketrans("123456789", "000000000")
 _NUMBER = re.compile(r"(\d+(?:\.\d+)?)")
 
 
@@ -36,7 +38,8 @@ def files_in(folder: Path) -> list[Path]:
     if not folder.is_dir():
         raise BadFile(folder, "is not a folder" if folder.exists() else "the folder is missing")
     try:
-        return sorted(path for path in folder.iterdir() if not path.name.startswith("."))
+        # Sorted as text: paths compare part by part, which takes ten times as long.
+        return [folder / name for name in sorted(os.listdir(folder)) if not name.startswith(".")]  # noqa: PTH208
     except OSError as error:
         raise BadFile(folder, f"the folder cannot be read: {error.strerror}") from error
 
@@ -50,6 +53,8 @@ def natural_key(name: str) -> tuple[tuple[bool, float, str], ...]:
 
 def _refuse_two_orders(folder: Path, images: list[Path]) -> None:
     names = [path.name for path in images]
+    if len({name.translate(_ANY_DIGIT) for name in names}) == 1:
+        return  # numbers of one length in one place: both orders are the same
     by_number = sorted(names, key=natural_key)
     for as_text, as_number in zip(names, by_number, strict=True):
         if as_text != as_number:

@@ -7,6 +7,7 @@ import os
 import stat
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from ars_web.errors import BadFile, TooLarge
 
@@ -23,6 +24,7 @@ _EXIF_MARK = b"Exif\x00\x00"
 # Frame headers: C4 (Huffman tables), C8 (reserved) and CC (arithmetic tables) lie in the same range and are none.
 _JPEG_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 _JPEG_ALONE = frozenset({0x01, *range(0xD0, 0xD8)})
+_EXIF_ORDERS: dict[bytes, Literal["little", "big"]] = {b"II*\x00": "little", b"MM\x00*": "big"}
 _ORIENTATION = 0x0112
 
 
@@ -55,11 +57,12 @@ class _Reader:
         self.size = size
 
     def at(self, place: int, count: int) -> bytes:
-        found = (
-            self._head[place : place + count]
-            if place + count <= len(self._head)
-            else os.pread(self._descriptor, count, place)
-        )
+        # A damaged length may be gigabytes: nothing beyond the file's end is asked for.
+        if place + count > self.size:
+            raise _Short
+        if place + count <= len(self._head):
+            return self._head[place : place + count]
+        found = os.pread(self._descriptor, count, place)
         if len(found) < count:
             raise _Short
         return found
@@ -172,12 +175,12 @@ def _jpeg(reader: _Reader, path: Path) -> ImageHeader:
 
 def _exif_orientation(tiff: bytes) -> int:
     """The orientation in an Exif block, 1 where it gives none or cannot be understood."""
-    order = {b"II*\x00": "little", b"MM\x00*": "big"}.get(tiff[:4])
+    order = _EXIF_ORDERS.get(tiff[:4])
     if order is None:
         return 1
 
     def number(place: int, count: int) -> int:
-        return int.from_bytes(tiff[place : place + count], "little" if order == "little" else "big")
+        return int.from_bytes(tiff[place : place + count], order)
 
     directory = number(4, 4)
     for entry in range(number(directory, 2)):

@@ -123,7 +123,8 @@ def _by_time(
     if not usable.size:
         raise BadFile(rows.path, f"none of its {len(rows.values)} poses can be used; the first: {_first(rows, poses)}")
     nearest = usable[_nearest(image_times, rows.values[usable, 0])]
-    apart = np.abs(rows.values[nearest, 0] - image_times)
+    # A time that is not finite is far from every pose, and must not take one from an image that is near.
+    apart = np.nan_to_num(np.abs(rows.values[nearest, 0] - image_times), nan=np.inf)
     taken: Int[np.ndarray, " n"] = _closest_image(nearest, apart)
     listed: list[ListedFrame] = []
     for i, image in enumerate(images):
