@@ -1,6 +1,7 @@
 """Boxes and classes as the JSON of the API and of box files."""
 
 import json
+import math
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,8 +16,9 @@ from ars_web.sessions.drafting import BoxDraft
 from ars_web.sessions.model import ObjectClass, VirtualBox
 from ars_web.sessions.names import LONGEST_NAME
 
-# Strict: a truth value or a string is no number. Whole numbers are.
-Coordinate = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+# Strict: a truth value or a string is no number. Whole numbers are. Beyond a million kilometres it is no place.
+Coordinate = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-1e9, le=1e9)]
+Component = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Length = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0, le=LARGEST_SIZE)]
 Size = tuple[Length, Length, Length]
 Id = Annotated[int, Field(strict=True, ge=0)]
@@ -31,13 +33,12 @@ class TransformJson(_Strict):
     """A rigid transform: a position in metres and a quaternion, w first, of any length but zero."""
 
     position: tuple[Coordinate, Coordinate, Coordinate]
-    wxyz: tuple[Coordinate, Coordinate, Coordinate, Coordinate]
+    wxyz: tuple[Component, Component, Component, Component]
 
     @field_validator("wxyz")
     @classmethod
     def _has_a_direction(cls, wxyz: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
-        length = np.linalg.norm(wxyz)
-        if not 1e-9 <= length < np.inf:
+        if not 1e-9 <= math.hypot(*wxyz) <= 1e9:
             raise ValueError("a quaternion must not be zero, nor too long to be normalised")
         return wxyz
 

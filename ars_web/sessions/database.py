@@ -30,7 +30,7 @@ class Database:
         self.path = path
         self._inode = _inode(path)
         self._engine = create_engine(
-            f"sqlite:///{path}", poolclass=QueuePool, pool_size=2, max_overflow=62, pool_timeout=BUSY_MS / 1000
+            migration.database_url(path), poolclass=QueuePool, pool_size=2, max_overflow=62, pool_timeout=BUSY_MS / 1000
         )
         event.listen(self._engine, "connect", _configure)
         event.listen(self._engine, "begin", _begin)

@@ -6,7 +6,7 @@ import threading
 from contextlib import closing
 from pathlib import Path
 
-from sqlalchemy import Connection, create_engine, event, text
+from sqlalchemy import URL, Connection, create_engine, event, text
 from sqlalchemy.engine.interfaces import DBAPIConnection
 from sqlalchemy.pool import ConnectionPoolEntry, NullPool
 
@@ -29,7 +29,7 @@ def bring_up_to_date(path: Path, *, scripts: Path = SCRIPTS, target: str = SCHEM
     Raises:
         StoreError: the database was made by a newer program, or a step failed.
     """
-    engine = create_engine(f"sqlite:///{path}", poolclass=NullPool)
+    engine = create_engine(database_url(path), poolclass=NullPool)
     event.listen(engine, "connect", _begin_by_hand)
     with engine.connect() as connection:
         connection.exec_driver_sql("BEGIN IMMEDIATE")
@@ -54,6 +54,11 @@ def bring_up_to_date(path: Path, *, scripts: Path = SCRIPTS, target: str = SCHEM
                 f" a copy is at {path.name}.before-{target}"
             ) from error
         connection.exec_driver_sql("COMMIT")
+
+
+def database_url(path: Path) -> URL:
+    """SQLAlchemy's name for a database file, whatever characters its path has."""
+    return URL.create("sqlite", database=str(path))
 
 
 def schema_of(connection: Connection) -> str | None:

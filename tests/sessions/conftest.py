@@ -37,7 +37,7 @@ def make_recording(tmp_path: Path) -> MakeRecording:
             0: Camera(640, 480, 500.1, 500.2, 319.5, 239.5),
             1: Camera(320, 240, 250.0, 250.0, 159.5, 119.5, "brown", (0.1, -0.2, 1e-3, 2e-3, 0.3)),
         }
-        return Recording("ars", source, cameras, tuple(listed), **{"class_names": ("cube",), **more})  # pyright: ignore
+        return Recording("ars", source, cameras, tuple(listed), **{"class_names": ("cube",), **more})
 
     return make
 

@@ -92,7 +92,7 @@ def test_a_stale_change_is_a_conflict_with_what_is_there_now(
     ):
         with pytest.raises(Conflict, match="at revision 2, not") as caught:
             stale()
-        assert same(caught.value.current, now)  # pyright: ignore
+        assert same(caught.value.current, now)
     ring = editor.change_class(sid, 0, expected_revision=0, name="ring", author="me")
     with pytest.raises(Conflict) as caught:
         editor.change_class(sid, 0, expected_revision=0, color="#000000", author="you")
@@ -245,7 +245,7 @@ def test_undo_never_takes_away_what_someone_else_did_since(
     moved = editor.change_box(sid, 1, expected_revision=1, T_world_box=a_box(1.0).T_world_box, author="you")
     with pytest.raises(Conflict, match=r"box 1 \('cube'\) was changed meanwhile, in revision 2") as caught:
         editor.undo(sid, author="me")
-    assert same(caught.value.current, moved)  # pyright: ignore
+    assert same(caught.value.current, moved)
     assert store.revision(sid) == 2
     editor.undo(sid, author="you")
     editor.undo(sid, author="me")  # what they did is taken back: nothing of theirs is lost
@@ -274,7 +274,7 @@ def test_undoing_a_class_that_is_used_by_now_is_refused(editor: SessionEditor, s
     box = editor.add_box(sid, class_id=ring.id, box=a_box(), author="you")
     with pytest.raises(Conflict, match="box 'ring' uses class 'ring'") as caught:
         editor.undo(sid, author="me")
-    assert same(caught.value.current, box)  # pyright: ignore
+    assert same(caught.value.current, box)
 
 
 def test_undo_that_no_longer_fits_is_refused(store: SessionStore, editor: SessionEditor, sid: str, a_box: MakeBox):
@@ -381,7 +381,7 @@ steps = st.lists(
 def test_whatever_is_done_the_state_is_what_the_log_replays(
     store: SessionStore, make_recording: Callable[..., object], steps: list[tuple[str, str, int]]
 ):
-    sid = store.create(make_recording(), name="table", class_names=["ball"]).id  # pyright: ignore
+    sid = store.create(make_recording(), name="table", class_names=["ball"]).id
     editor = SessionEditor(store)
     origin = store.state(sid)
     told: list[int] = []

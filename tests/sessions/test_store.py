@@ -290,7 +290,7 @@ def test_every_connection_is_durable(store: SessionStore, sid: str):
     found: list[tuple[object, ...]] = []
 
     def look() -> None:
-        database = store._session(sid).database  # pyright: ignore
+        database = store._session(sid).database
         with database.reading() as connection:
             meet.wait()  # so that all eight hold a connection of their own
             seen.add(id(connection.connection.dbapi_connection))
