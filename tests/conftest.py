@@ -1,7 +1,9 @@
 """What every test stands on: shapes checked at run time, and the recorded data where it is present."""
 
+import os
 from pathlib import Path
 
+import pytest
 from jaxtyping import install_import_hook
 
 # Every annotated shape in geometry/ is checked while the tests run. Kernel modules hold numba code, which takes
@@ -17,6 +19,18 @@ SHARED = Path(__file__).parents[2] / "shared"
 # Tests under recorded/ read that data. They are not collected where it is absent: nothing is skipped, and the
 # header says so.
 collect_ignore = [] if (SHARED / "data").is_dir() else ["recorded"]
+
+
+@pytest.fixture(scope="session")
+def demo_recording(tmp_path_factory: pytest.TempPathFactory):
+    """A small generated recording with its truth (`DemoTruth`; its `.folder` is an ARS scene folder): nine objects
+    of five classes in nine images of 480 x 360, the last of which shows none. Made once a test run; read only."""
+    from ars_web.demo.recording import make_demo
+
+    root = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        root = root.parent  # shared by the workers; make_demo lets one of them make it
+    return make_demo(root / "demo-recording", frames=9, size=(480, 360))
 
 
 def pytest_report_header() -> str:
