@@ -32,7 +32,7 @@ ENV PATH=/opt/ars-web/bin:$PATH \
     NUMBA_CACHE_DIR=/var/cache/ars-web \
     PYTHONUNBUFFERED=1
 USER ars
-WORKDIR /home/ars
+WORKDIR /sessions
 # Shows that the image works, and leaves the compiled kernels for the first real use.
 RUN ars-web demo --no-browser --sessions /tmp/demo && rm -r /tmp/demo && ars-web check
 VOLUME /sessions
