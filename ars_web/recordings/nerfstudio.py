@@ -81,7 +81,7 @@ def read(path: Path, options: ReadOptions) -> Recording:
         except ArsError as error:
             listed.append(ListedFrame(None, image, -1, where, problem=str(error)))
             continue
-        key = (own.key(), size)
+        key = (None if own is transforms else own.key(), size)
         if key not in known:
             try:
                 known[key] = camera_of(own, size)

@@ -26,8 +26,10 @@ class ReadOptions:
         """`path` itself, where it may be read.
 
         Raises:
-            RefusedPath: it lies outside `within` once its links are followed.
+            RefusedPath: it lies outside `within` once its links are followed, or has a NUL in it.
         """
+        if "\0" in str(path):
+            raise RefusedPath(f"{str(path)!r} has a NUL in it and can be no path")
         if self.within is not None and not real(path).is_relative_to(real(self.within)):
             raise RefusedPath(f"{path} leads outside {self.within}, and nothing outside it is read")
         return path

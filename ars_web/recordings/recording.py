@@ -29,10 +29,10 @@ class Frame:
 
 @dataclass(frozen=True)
 class SkippedFrame:
-    """A frame that the recording lists but that cannot be used.
+    """A frame (or, in a manifest, a box) that the recording lists but that cannot be used.
 
     Attributes:
-        name: the image's name, or what the file calls the frame.
+        name: the image's name, or what the file calls the frame or the box.
         reason: why, in words.
         where: `FILE:LINE`, `FILE` where lines mean nothing.
     """

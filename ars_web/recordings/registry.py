@@ -1,6 +1,7 @@
 """The readers by format, and finding a recording's format by looking at what is there."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,7 +20,7 @@ class Reader:
     Attributes:
         format: its key.
         title: what it is called, and which files it needs.
-        recognises: whether a path that exists looks like it; raises nothing.
+        recognises: whether a path that exists looks like it; damage is for `read` to find.
         read: reads it, whole and sound, or raises.
     """
 
@@ -40,8 +41,13 @@ READERS: dict[str, Reader] = {
 
 
 def detect_formats(path: Path) -> list[str]:
-    """The formats that the file or folder at `path` looks like; none, one or several."""
-    return [key for key, reader in READERS.items() if reader.recognises(path)]
+    """The formats that the file or folder at `path` looks like; none, one or several.
+
+    Raises:
+        BadFile: the file system does not let it be looked at.
+    """
+    with _file_system_errors(path):
+        return [key for key, reader in READERS.items() if reader.recognises(path)]
 
 
 def read_recording(path: Path, *, format: str = "auto", options: ReadOptions = NOTHING_SAID) -> Recording:  # noqa: A002
@@ -55,11 +61,19 @@ def read_recording(path: Path, *, format: str = "auto", options: ReadOptions = N
     if format != "auto" and format not in READERS:
         raise BadInput(f"format {format!r} is unknown; known are auto, {', '.join(READERS)}")
     options.allowed(path)
-    if not path.exists():
-        raise BadFile(path, "is missing")
-    if format == "auto":
-        format = _only_format(path)  # noqa: A001
-    return READERS[format].read(path, options)
+    with _file_system_errors(path):
+        if not path.exists():
+            raise BadFile(path, "is missing")
+        return READERS[_only_format(path) if format == "auto" else format].read(path, options)
+
+
+@contextmanager
+def _file_system_errors(path: Path) -> Generator[None]:
+    """Whatever the file system refuses (permission, a name too long, a disk that fails) as the BadFile it is."""
+    try:
+        yield
+    except OSError as error:
+        raise BadFile(error.filename or path, f"cannot be read: {error.strerror}") from error
 
 
 def _only_format(path: Path) -> str:

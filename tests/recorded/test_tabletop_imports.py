@@ -1,5 +1,6 @@
 """The five forms of the recorded table top are one recording: same cameras, same poses, same images."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -58,8 +59,13 @@ def test_the_folder_of_formats_is_ambiguous() -> None:
         read_recording(FORMATS)
 
 
-def test_cell_has_a_lens() -> None:
+def test_cell_is_what_its_truth_says() -> None:
     cell = read_recording(DATA / "cell")
-    assert len(cell.frames) == 60
+    truth = json.loads((DATA / "cell" / "truth" / "truth.json").read_text())
     assert cell.skipped == ()
-    assert cell.cameras[0].model == "brown"
+    Ts = [frame["T_world_camera"] for frame in truth["frames"]]
+    np.testing.assert_allclose(cell.Ts_world_camera, Ts, rtol=0, atol=1e-6)
+    camera = cell.cameras[0]
+    assert camera.model == "brown"
+    np.testing.assert_allclose(camera.K, truth["K"], rtol=0, atol=1e-6)
+    np.testing.assert_allclose(camera.distortion, [*truth["dist"], 0.0], rtol=0, atol=1e-9)

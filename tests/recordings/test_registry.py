@@ -176,3 +176,16 @@ def test_poses_cannot_be_written_to(written) -> None:
     frame = read_recording(written("ars")).frames[0]
     with pytest.raises(ValueError, match="read-only"):
         frame.T_world_camera[0, 0] = 2.0
+
+
+def test_what_the_file_system_refuses_is_named(tmp_path: Path) -> None:
+    unthinkable = tmp_path / ("x" * 300)
+    with pytest.raises(BadFile, match="xxx: cannot be read: File name too long"):
+        read_recording(unthinkable)
+    with pytest.raises(BadFile, match="cannot be read: File name too long"):
+        detect_formats(unthinkable)
+
+
+def test_a_nul_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(RefusedPath, match="has a NUL in it"):
+        read_recording(tmp_path / "a\0b")

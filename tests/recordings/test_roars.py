@@ -95,6 +95,13 @@ def test_an_absolute_scene_is_refused_outside(
         read_recording(manifest(scene_path="../../.."), options=ReadOptions(within=tmp_path))
 
 
+def test_a_scene_or_an_image_with_a_nul(manifest: Callable[..., Path], truth, tmp_path: Path) -> None:
+    with pytest.raises(RefusedPath, match="has a NUL in it"):
+        read_recording(manifest(scene_path="sc\0ene"))
+    file = manifest(image_filenames_lists=["a\0b.png", *truth.names[1:]])
+    assert len(read_recording(file, options=ReadOptions(within=tmp_path)).frames) == 5
+
+
 def test_names_may_be_relative_to_the_scene(manifest: Callable[..., Path], truth) -> None:
     file = manifest(images_path=None, image_filenames_lists=[f"images/{name}" for name in truth.names])
     assert [frame.name for frame in read_recording(file).frames] == truth.names
