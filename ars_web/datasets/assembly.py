@@ -47,12 +47,17 @@ def publish(plan: ExportPlan, partial: Path) -> None:
     """Give the dataset its name, by one rename of a folder whose bytes are on the disk."""
     os.sync()
     _dataset_folder(partial).rename(plan.out)
-    shutil.rmtree(partial)
+    remove_folder(partial)
 
 
 def is_published(partial: Path) -> bool:
     """Whether what was assembled here has left already: the shards have no files any more and are of no use."""
     return (partial / _BEGUN).exists() and not _dataset_folder(partial).exists()
+
+
+def remove_folder(folder: Path) -> None:
+    """Remove a folder and all that is in it."""
+    shutil.rmtree(folder)
 
 
 def _dataset_folder(partial: Path) -> Path:

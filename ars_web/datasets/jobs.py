@@ -43,6 +43,8 @@ it begins to pay."""
 MOST_DEATHS = 3
 """A shard that kills its worker this often is given up."""
 
+_BOOT = "boot"
+
 _LOOK_EVERY = 0.1
 """Seconds between looks whether the caller wants to stop."""
 
@@ -116,17 +118,27 @@ def _locked(partial: Path) -> Generator[None]:
 
 def _prepare(plan: ExportPlan, partial: Path) -> None:
     """Leave in the partial folder this plan and its finished shards, and nothing else."""
-    digest = digest_of(plan)
-    if read_digest(partial) != digest or is_published(partial):
-        if any(partial.iterdir()):
-            _log.info("%s holds the beginning of another export, which is discarded", partial)
-        for entry in partial.iterdir():
-            _remove(entry)
-        (partial / "shards").mkdir()
-        write_plan(plan, partial)
-    elif done := finished_shards(plan, partial):
+    digest, boot = digest_of(plan), _boot()
+    of_this_plan = read_digest(partial) == digest and not is_published(partial)
+    # A shard's rename can outlive a power cut that its files' bytes did not, and syncing each shard costs more than
+    # the rare loss: what was written before this machine started is written again.
+    if of_this_plan and (partial / _BOOT).is_file() and (partial / _BOOT).read_text() == boot:
+        done = finished_shards(plan, partial)
         _log.info("%s: %d of %d shards are done already", partial, len(done), len(plan.shards))
-    (partial / CANCEL).unlink(missing_ok=True)
+        return
+    if any(partial.iterdir()):
+        _log.info("%s holds the beginning of another export, which is discarded", partial)
+    for entry in partial.iterdir():
+        _remove(entry)
+    (partial / "shards").mkdir()
+    write_plan(plan, partial)
+    (partial / _BOOT).write_text(boot)
+
+
+def _boot() -> str:
+    """What tells one start of this machine from another; the same always where the system does not say."""
+    path = Path("/proc/sys/kernel/random/boot_id")
+    return path.read_text() if path.is_file() else "unknown"
 
 
 def _remove(entry: Path) -> None:
@@ -164,6 +176,7 @@ def _run_shards(
     while missing := sorted(set(range(len(plan.shards))) - set(finished_shards(plan, partial))):
         for number in missing:
             shutil.rmtree(unfinished_folder(partial, number), ignore_errors=True)
+        (partial / CANCEL).unlink(missing_ok=True)
         batch = [number for number in missing if not deaths[number]] or missing[:1]
         try:
             _run_batch(plan, partial, batch, make, on_progress, cancelled)

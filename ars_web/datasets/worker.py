@@ -88,14 +88,8 @@ def export_shard(partial: str, number: int, digest: str) -> int:
     report = ShardReport(splits=_counts(shard), dropped=dropped, digests=digests)
     (tmp / "shard.json").write_text(report.model_dump_json(), encoding="utf-8")
     check()
-    _settle(tmp, shard_folder(folder, number))
+    tmp.rename(shard_folder(folder, number))
     return len(shard.stems)
-
-
-def _settle(tmp: Path, whole: Path) -> None:
-    """Rename a written shard to its place, once its bytes are on the disk."""
-    os.sync()
-    tmp.rename(whole)
 
 
 @lru_cache(maxsize=1)
