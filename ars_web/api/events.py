@@ -29,7 +29,7 @@ class _Topic:
     """One session that someone listens to; `changed` is set, and replaced, whenever its log may have grown."""
 
     listeners: int = 0
-    revision: int = -1
+    revision: int = -2
     changed: asyncio.Event = field(default_factory=asyncio.Event)
 
 
@@ -38,12 +38,15 @@ class EventHub:
 
     Edits made through this process wake them at once (`wake`); those of another process within `poll_seconds`, by
     one cheap look at each session's revision, however many listen. No stream holds a thread.
+
+    Attributes:
+        keep_alive_seconds: how long a stream may be silent before a comment is sent.
     """
 
     def __init__(self, store: SessionStore, *, poll_seconds: float = 0.5, keep_alive_seconds: float = 15.0) -> None:
         self._store = store
         self._poll_seconds = poll_seconds
-        self._keep_alive_seconds = keep_alive_seconds
+        self.keep_alive_seconds = keep_alive_seconds
         self._topics: dict[str, _Topic] = {}
         self._closing = False
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -61,6 +64,11 @@ class EventHub:
             with suppress(asyncio.CancelledError):
                 await poll
             self._loop = None
+
+    @property
+    def watched(self) -> frozenset[str]:
+        """The sessions that someone listens to."""
+        return frozenset(self._topics)
 
     def close(self) -> None:
         """End all streams; on the event loop's thread. The server calls it before it waits for connections."""
@@ -97,7 +105,7 @@ class EventHub:
                 if edits or self._closing:
                     continue
                 try:
-                    async with asyncio.timeout(self._keep_alive_seconds):
+                    async with asyncio.timeout(self.keep_alive_seconds):
                         await changed.wait()
                 except TimeoutError:
                     yield b": still here\n\n"

@@ -23,7 +23,7 @@ IMAGE_CACHE = "private, max-age=3600"
 def frames(
     sid: str,
     services: ServicesDep,
-    offset: Annotated[int, Query(ge=0)] = 0,
+    offset: Annotated[int, Query(ge=0, lt=2**53)] = 0,
     limit: Annotated[int, Query(ge=1, le=FRAMES_AT_ONCE)] = 1000,
 ) -> Response:
     """The frames from `offset`, at most `limit` of them; `total` says how many there are."""
