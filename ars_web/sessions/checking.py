@@ -43,6 +43,8 @@ def check_database(connection: Connection) -> list[str]:
         return [f"the database is damaged: {'; '.join(said)}"]
     broken = connection.exec_driver_sql("PRAGMA foreign_key_check").all()
     problems = [f"a row of {row[0]} refers to a row of {row[2]} that is not there" for row in broken[:5]]
+    if not connection.execute(select(func.count()).select_from(tables.session)).scalar_one():
+        problems.append("the row that describes the session is gone")
     return problems + _wrong_kinds(connection)
 
 

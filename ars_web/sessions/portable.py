@@ -161,15 +161,12 @@ def _take_database(
         with explained(path):
             problems = check_strange(path)
         if not problems:
-            with closing(Database(path)) as database:
-                with database.writing() as connection:
-                    problems = check_database(connection) or check_portable(connection)
-                    if not problems and name is not None:
-                        _rename(SessionTransaction(connection, rows.load_state(connection)), name)
-                with database.reading() as connection:
-                    frames = rows.load_frames(connection, building)
+            with closing(Database(path)) as database, database.writing() as connection:
+                problems = check_database(connection) or check_portable(connection)
                 if not problems:
-                    return frames
+                    if name is not None:
+                        _rename(SessionTransaction(connection, rows.load_state(connection)), name)
+                    return rows.load_frames(connection, building)
     except StoreError as error:
         raise BadFile(source, f"its {DATABASE} cannot be used: {error}") from error
     raise BadFile(source, f"its {DATABASE} cannot be used: {problems[0]}")
