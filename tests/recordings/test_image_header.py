@@ -1,3 +1,4 @@
+import os
 import struct
 import zlib
 from pathlib import Path
@@ -171,3 +172,18 @@ def test_no_bytes_do_more_than_be_refused(tmp_path_factory: pytest.TempPathFacto
     except ArsError:
         return
     assert 0 < header.width * header.height <= MAX_IMAGE_PIXELS
+
+
+def test_a_damaged_length_asks_for_no_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = written(tmp_path, PNG[:33] + struct.pack(">I", 0xFFFFFFF0) + b"eXIf" + PNG[33:])
+    asked: list[int] = []
+    pread = os.pread
+
+    def counted(descriptor: int, count: int, place: int) -> bytes:
+        asked.append(count)
+        return pread(descriptor, min(count, 1 << 20), place)
+
+    monkeypatch.setattr(os, "pread", counted)
+    with pytest.raises(BadFile, match="ends within its header"):
+        read_header(path)
+    assert max(asked) <= 1 << 16
