@@ -30,10 +30,12 @@ def circling(n: int) -> np.ndarray:
 
 
 def boxes(n: int = 3) -> list[Box]:
-    """n boxes in a row through the origin; the outer ones leave the image in some frames."""
+    """n boxes in a row; the outer ones leave the image in some frames."""
     return [
         Box(
-            rigid_transform.from_rotation(rigid_transform.rotation_about_z(0.4 * i), np.array([0.25 * (i - 1), 0, 0])),
+            rigid_transform.from_rotation(
+                rigid_transform.rotation_about_z(0.4 * i), np.array([0.25 * i - 0.7 * (i == 0), 0, 0])
+            ),
             np.array([0.2, 0.15, 0.1 + 0.05 * i]),
         )
         for i in range(n)

@@ -2,6 +2,7 @@
 
 Boxes are 1-based and inclusive: pixel columns and rows whose larger part lies in the label. `truncated` and
 `occluded` follow VOC's own annotation guide: more than 15 % of the object outside, more than 5 % of it hidden.
+`labelmap.txt`, which datumaro and CVAT ask for, lists the classes in their order; VOC itself has no place for it.
 """
 
 from collections.abc import Sequence
@@ -100,6 +101,8 @@ def _join(dataset: Dataset, fragments: Sequence[Path], folder: Path) -> FileDige
     for name, members in lists.items():
         sources = [f / f"{split}.txt" for split in members for f in fragments]
         join_files(sources, folder / "ImageSets" / "Main" / f"{name}.txt")
+    labels = "".join(f"{name.replace(':', '_')}:::\n" for name in dataset.class_names)
+    (folder / "labelmap.txt").write_text(f"# label:color_rgb:parts:actions\n{labels}", encoding="utf-8")
     return {}
 
 

@@ -1,0 +1,32 @@
+"""Every format's files, byte by byte, as they were looked at once and found right.
+
+Where a format changes on purpose, write the files anew from the folder that the failure names, and look at them.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from ars_web import __version__
+from ars_web.datasets.jobs import plan_export, run_export
+from ars_web.datasets.options import ExportOptions
+from ars_web.datasets.registry import WRITERS
+from ars_web.sessions.model import SessionSnapshot
+
+GOLDEN = Path(__file__).parents[1] / "golden"
+
+
+@pytest.mark.parametrize("kind", WRITERS)
+def test_files_are_the_golden_ones(make_snapshot: Callable[..., SessionSnapshot], tmp_path: Path, kind: str) -> None:
+    options = ExportOptions.model_validate(
+        {"images": "none", "frames": {"step": 3}, "split": {"train": 0.5, "val": 0.25, "test": 0.25, "seed": 7}}
+    )
+    snapshot = make_snapshot(12, classes=("cube", 'a "tall" & <odd> one: #1'))
+    out = tmp_path / kind
+    run_export(plan_export([snapshot], format=kind, options=options, out=out, frames_per_shard=2))
+    found = {str(p.relative_to(out)): p.read_text() for p in sorted(out.rglob("*")) if p.is_file()}
+    # The version is the one thing in it that changes by itself.
+    found["dataset.json"] = found["dataset.json"].replace(f'"version": "{__version__}"', '"version": "VERSION"')
+    golden = GOLDEN / kind
+    assert found == {str(p.relative_to(golden)): p.read_text() for p in sorted(golden.rglob("*")) if p.is_file()}
