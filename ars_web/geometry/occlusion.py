@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from ars_web.errors import BadInput
 from ars_web.geometry import camera as cameras
@@ -16,9 +16,6 @@ from ars_web.geometry.labels import NEAR
 
 FEWEST_RAYS = 10
 """Along each side of a box's grid, however small the box: 100 rays tell shares of a hundredth apart."""
-
-MOST_RAYS = 4096
-"""Along each side of a box's grid, however large the image."""
 
 RAY_SPACING = 8
 """Pixels between the rays that are computed; the others lie between them, off by less than 0.01 px."""
@@ -49,7 +46,7 @@ def visible_fractions(
     n, b = len(Ts_world_camera), len(boxes)
     visible = np.empty((n, b))
     Ts_world_box, sizes = stack(list(boxes))
-    rays = _rays(camera)
+    rays, beyond = _rays(camera), _beyond_faces(Ts_world_box, sizes)
 
     def look(frames: slice) -> None:
         # Copies, so that the compiled loop never meets an array of another order or one that may only be read.
@@ -59,13 +56,13 @@ def visible_fractions(
             Ts,
             Ts_world_box,
             sizes / 2,
+            beyond,
             NEAR,
             rays,
             float(RAY_SPACING),
             seen,
             float(step),
             FEWEST_RAYS,
-            MOST_RAYS,
             visible[frames],
         )
 
@@ -74,9 +71,22 @@ def visible_fractions(
 
 
 @lru_cache(maxsize=16)
-def _rays(camera: Camera) -> Float[np.ndarray, "h w 2"]:
+def _rays(camera: Camera) -> Float[np.ndarray, "2 h w"]:
     """Points of the normalised plane at every RAY_SPACING-th image coordinate, the image's far borders included."""
     u = np.arange(0, camera.width + RAY_SPACING, RAY_SPACING, dtype=np.float64)
     v = np.arange(0, camera.height + RAY_SPACING, RAY_SPACING, dtype=np.float64)
     image = np.stack(np.meshgrid(u, v), axis=-1)
-    return np.ascontiguousarray(cameras.normalised_from_pixels(camera, cameras.pixels_from_image(image)))
+    rays = cameras.normalised_from_pixels(camera, cameras.pixels_from_image(image))
+    return np.ascontiguousarray(np.moveaxis(rays, -1, 0))
+
+
+def _beyond_faces(Ts_world_box: Float[np.ndarray, "b 4 4"], sizes: Float[np.ndarray, "b 3"]) -> Int[np.ndarray, "b b"]:
+    """For each box and each other one, beyond which of its six faces all of the other lies: bit 2 i for the face at
+    the positive end of axis i, bit 2 i + 1 for that at the negative end."""
+    axes, centres = Ts_world_box[:, :3, :3], Ts_world_box[:, :3, 3]
+    turned = np.einsum("bki,ckj->bcij", axes, axes)
+    place = np.einsum("bki,bck->bci", axes, centres[None, :] - centres[:, None])
+    reach = np.einsum("bcij,cj->bci", np.abs(turned), sizes / 2)
+    bits = 1 << np.arange(6)
+    above, below = place - reach >= sizes[:, None] / 2, place + reach <= -sizes[:, None] / 2
+    return above @ bits[0::2] + below @ bits[1::2]
