@@ -8,7 +8,7 @@ from pathlib import Path
 
 from sqlalchemy import Connection, create_engine, event
 from sqlalchemy.engine.interfaces import DBAPIConnection
-from sqlalchemy.exc import DatabaseError, OperationalError
+from sqlalchemy.exc import DatabaseError, NoResultFound, OperationalError
 from sqlalchemy.exc import TimeoutError as PoolTimeout
 from sqlalchemy.pool import ConnectionPoolEntry, QueuePool
 
@@ -29,6 +29,7 @@ class Database:
         """Raises StoreError for a file that is no usable database, NotFound where there is none."""
         self.path = path
         self._inode = _inode(path)
+        self._closed = False
         self._engine = create_engine(
             migration.database_url(path), poolclass=QueuePool, pool_size=2, max_overflow=62, pool_timeout=BUSY_MS / 1000
         )
@@ -39,6 +40,8 @@ class Database:
         try:
             with self._connect(write=False) as connection:
                 schema = migration.schema_of(connection)
+            if schema is None:
+                raise StoreError(f"{path}: {_REMEDIES['not a database']}")
             if schema != migration.SCHEMA:
                 with explained(path):
                     migration.bring_up_to_date(path)
@@ -74,13 +77,18 @@ class Database:
 
     def close(self) -> None:
         """Close the connections that are not in use; those in use close when they are given back."""
+        self._closed = True
         self._engine.dispose()
 
     @contextmanager
     def _connect(self, *, write: bool) -> Generator[Connection]:
-        with explained(self.path), self._engine.connect().execution_options(ars_write=write) as connection:
-            with connection.begin():
-                yield connection
+        try:
+            with explained(self.path), self._engine.connect().execution_options(ars_write=write) as connection:
+                with connection.begin():
+                    yield connection
+        finally:
+            if self._closed:  # by another thread, while this one was at work
+                self._engine.dispose()
 
     def _refuse_moved(self) -> None:
         if not self.is_current:
@@ -127,6 +135,8 @@ def explained(path: Path) -> Generator[None]:
         yield
     except PoolTimeout as error:
         raise StoreError(f"{path}: too many requests at once; try again") from error
+    except NoResultFound as error:
+        raise StoreError(f"{path}: a row that must be there is not: {_REMEDIES['malformed']}") from error
     except sqlite3.Error as error:
         raise StoreError(f"{path}: {_remedy(str(error))}") from error
     except DatabaseError as error:

@@ -10,7 +10,7 @@ from ars_web.errors import BadInput, Conflict, NotFound
 from ars_web.geometry.box import Box
 from ars_web.geometry.rigid_transform import Transform
 from ars_web.sessions.model import ObjectClass, SessionState, VirtualBox
-from ars_web.sessions.names import checked_name, unused_name
+from ars_web.sessions.names import FreshNames, checked_name
 
 T = TypeVar("T", VirtualBox, ObjectClass)
 
@@ -35,14 +35,14 @@ def drafted(state: SessionState, drafts: Sequence[BoxDraft]) -> list[VirtualBox]
         BadInput: a class does not exist or a name cannot be used; among several, the message says which.
     """
     boxes: list[VirtualBox] = []
-    taken = {box.name for box in state.boxes.values()}
+    names = FreshNames(box.name for box in state.boxes.values())
     for i, draft in enumerate(drafts):
         try:
             a_class = existing_class(state, draft.class_id)
-            name = unused_name(a_class.name, taken) if draft.name is None else checked_name(draft.name, what="a box")
+            name = names.give(a_class.name) if draft.name is None else checked_name(draft.name, what="a box")
         except BadInput as error:
             raise error if len(drafts) == 1 else BadInput(f"box {i}: {error}") from error
-        taken.add(name)
+        names.take(name)
         boxes.append(
             VirtualBox(state.next_box_id + i, a_class.id, name, draft.box, has_hull=False, revision=state.revision + 1)
         )

@@ -80,8 +80,18 @@ def utc_text(at: datetime) -> str:
 
 
 def utc_from_text(text: str) -> datetime:
-    """The moment that `utc_text` wrote."""
-    return datetime.fromisoformat(text)
+    """The moment that `utc_text` wrote.
+
+    Raises:
+        StoreError: it is none, or says no time zone.
+    """
+    try:
+        at = datetime.fromisoformat(text)
+    except ValueError as error:
+        raise StoreError(f"the session's database holds {text!r} where a moment should be") from error
+    if at.tzinfo is None:
+        raise StoreError(f"the session's database holds {text!r}, a moment without a time zone")
+    return at
 
 
 def _change_json(change: Change) -> Json:

@@ -11,7 +11,7 @@ from ars_web.recordings.recording import Recording
 from ars_web.sessions import migration, rows
 from ars_web.sessions.database import Database
 from ars_web.sessions.model import ObjectClass, SessionState, VirtualBox
-from ars_web.sessions.names import checked_image_name, checked_name, unused_name
+from ars_web.sessions.names import FreshNames, checked_image_name, checked_name
 from ars_web.sessions.palette import next_color
 from ars_web.sessions.session_folders import DATABASE
 
@@ -32,15 +32,16 @@ def starting_state(recording: Recording, *, name: str, class_names: Sequence[str
             id_ = by_name[class_name] = len(classes)
             classes[id_] = ObjectClass(id_, class_name, next_color(c.color for c in classes.values()), revision=0)
     boxes: dict[int, VirtualBox] = {}
+    names = FreshNames(())
     for recorded in recording.boxes:
-        if recorded.class_name not in by_name:
-            raise BadInput(f"a box of the recording is of class {recorded.class_name!r}, which it does not list")
-        taken = [box.name for box in boxes.values()]
+        class_name = checked_name(recorded.class_name, what="a class")
+        if class_name not in by_name:
+            raise BadInput(f"a box of the recording is of class {class_name!r}, which it does not list")
         id_ = len(boxes) + 1
         boxes[id_] = VirtualBox(
             id=id_,
-            class_id=by_name[recorded.class_name],
-            name=unused_name(recorded.class_name, taken),
+            class_id=by_name[class_name],
+            name=names.give(class_name),
             box=recorded.box,
             has_hull=False,
             revision=0,

@@ -40,17 +40,26 @@ def checked_key(key: str) -> str:
     return key
 
 
-def unused_name(base: str, taken: Iterable[str]) -> str:
-    """`base`, or `base 2`, `base 3`, … where it is taken; never longer than LONGEST_NAME."""
-    taken = set(taken)
-    if base not in taken:
-        return base
-    number = 2
-    while True:
-        name = f"{base[: LONGEST_NAME - len(f' {number}')]} {number}"
-        if name not in taken:
-            return name
-        number += 1
+class FreshNames:
+    """Gives names that are not taken, for any number of things without looking at all of them each time."""
+
+    def __init__(self, taken: Iterable[str]) -> None:
+        self._taken = set(taken)
+        self._next: dict[str, int] = {}
+
+    def take(self, name: str) -> None:
+        """Have `name` be taken from now on."""
+        self._taken.add(name)
+
+    def give(self, base: str) -> str:
+        """`base`, or `base 2`, `base 3`, … where it is taken, never longer than LONGEST_NAME; taken from now on."""
+        number, name = self._next.get(base, 2), base
+        while name in self._taken:
+            name = f"{base[: LONGEST_NAME - len(f' {number}')]} {number}"
+            number += 1
+        self._next[base] = number
+        self._taken.add(name)
+        return name
 
 
 def checked_image_name(name: str) -> str:

@@ -255,14 +255,26 @@ class SessionStore:
 
     def _session(self, sid: str) -> _Open:
         folder = session_folders.session_folder(self.folder, sid)
+        session = self._opened(sid)
+        if session is None:
+            # Not under the lock: opening may migrate, or wait for another process, and the other sessions need not.
+            opened = _Open(Database(folder / session_folders.DATABASE))
+            session = self._opened(sid, otherwise=opened) or opened
+            if session is not opened:
+                opened.database.close()
+        return session
+
+    def _opened(self, sid: str, *, otherwise: _Open | None = None) -> _Open | None:
+        """The open session, or `otherwise`, which then is open; those in the way are closed."""
         with self._lock:
             session = self._open.get(sid)
-            if session is not None and session.database.is_current:
-                self._open.move_to_end(sid)
-                return session
+            if session is not None and not session.database.is_current:
+                self._open.pop(sid).database.close()
+                session = None
+            if session is None and otherwise is not None:
+                session = self._open[sid] = otherwise
             if session is not None:
-                session.database.close()
-            session = self._open[sid] = _Open(Database(folder / session_folders.DATABASE))
+                self._open.move_to_end(sid)
             while len(self._open) > OPEN_AT_ONCE:
                 self._open.popitem(last=False)[1].database.close()
             return session

@@ -33,7 +33,7 @@ from ars_web.sessions.edits import Edit
 from ars_web.sessions.model import SessionState
 from ars_web.sessions.store import SessionStore
 
-LONGEST_LIFE = 0.25
+LONGEST_LIFE = 0.4
 """Seconds an editor lives at most."""
 
 

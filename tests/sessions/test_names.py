@@ -3,7 +3,7 @@
 import pytest
 
 from ars_web.errors import BadInput, RefusedPath
-from ars_web.sessions.names import LONGEST_NAME, checked_image_name, checked_key, checked_name, unused_name
+from ars_web.sessions.names import LONGEST_NAME, FreshNames, checked_image_name, checked_key, checked_name
 
 
 @pytest.mark.parametrize("name", ["", "  ", "a" * 101, "a\nb", "a\0b", "\ud800", "a\u2028b", "a\x7fb"])
@@ -18,10 +18,18 @@ def test_what_people_write_is_a_name(name: str):
 
 
 def test_a_taken_name_gets_the_next_number_and_stays_short_enough():
-    assert unused_name("cube", []) == "cube"
-    assert unused_name("cube", ["cube", "cube 2", "cube 4"]) == "cube 3"
+    assert FreshNames([]).give("cube") == "cube"
+    names = FreshNames(["cube", "cube 2", "cube 4"])
+    assert [names.give("cube") for _ in range(3)] == ["cube 3", "cube 5", "cube 6"]
+    names.take("ring")
+    assert names.give("ring") == "ring 2"
     long = "a" * LONGEST_NAME
-    assert unused_name(long, [long]) == "a" * (LONGEST_NAME - 2) + " 2"
+    assert FreshNames([long]).give(long) == "a" * (LONGEST_NAME - 2) + " 2"
+
+
+def test_very_many_names_are_given_as_fast_as_few():
+    names = FreshNames([])
+    assert len({names.give("cube") for _ in range(100_000)}) == 100_000
 
 
 @pytest.mark.parametrize("name", ["", "/etc/passwd", "../a.jpg", "a/../b.jpg", "a//b.jpg", "./a.jpg", "a/", "a\0.jpg"])

@@ -293,7 +293,7 @@ TAMPERINGS = {
     ),
     "a date that is none": (
         "UPDATE edit SET at = 'yesterday'",
-        "cannot be read: Invalid isoformat",
+        "holds 'yesterday' where a moment should be",
     ),
     "another next id": (
         "UPDATE session SET next_box_id = 1",

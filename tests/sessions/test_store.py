@@ -414,6 +414,73 @@ def test_a_damaged_session_is_named_and_does_not_hide_the_others(
     assert any(sid in problem and "no session database" in problem for problem in store.check())
 
 
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        ("DELETE FROM session", "a row that must be there is not"),
+        ("UPDATE session SET changed = 'now'", "holds 'now' where a moment should be"),
+        ("UPDATE session SET changed = '2026-01-01T00:00:00'", "without a time zone"),
+        (None, "this is no session database"),
+    ],
+)
+def test_damage_of_one_session_is_told_and_hides_no_other(
+    store: SessionStore, make_recording: MakeRecording, sid: str, damage: str | None, message: str
+):
+    other = store.create(make_recording(), name="other").id
+    store.close()
+    path = store.folder / sid / "session.sqlite"
+    if damage is None:
+        path.write_bytes(b"")
+    else:
+        with closing(sqlite3.connect(path)) as connection:
+            connection.execute(damage)
+            connection.commit()
+    with pytest.raises(StoreError, match=message):
+        store.summary(sid)
+    assert [summary.id for summary in store.list()] == [other]
+    assert any(problem.startswith(f"session {sid}: ") for problem in store.check())
+
+
+def test_check_sees_what_the_log_does_not_explain(store: SessionStore, sid: str, a_box: MakeBox):
+    SessionEditor(store).add_box(sid, class_id=0, box=a_box(), author="me")
+    frames = store.frames(sid)
+    for image in frames.images:
+        image.parent.mkdir(parents=True, exist_ok=True)
+        image.write_bytes(b"x")
+    assert store.check() == []
+    with closing(sqlite3.connect(store.folder / sid / "session.sqlite")) as connection:
+        connection.execute("UPDATE box SET size_x = 2 * size_x")
+        connection.commit()
+    store.close()
+    assert store.check() == [f"session {sid}: the log and the tables differ in box 1"]
+    frames.images[1].unlink()
+    assert f"1 images are not where they were, the first is {frames.images[1]}" in store.check()[1]
+
+
+def test_one_session_that_is_slow_to_open_holds_up_no_other(
+    store: SessionStore, make_recording: MakeRecording, sid: str
+):
+    other = store.create(make_recording(), name="other").id
+    store.close()
+    path = store.folder / sid / "session.sqlite"
+    with closing(sqlite3.connect(path)) as connection:  # so that opening it migrates, for which it waits below
+        connection.execute("DROP TABLE request")
+        connection.execute("UPDATE alembic_version SET version_num = '0001'")
+        connection.commit()
+    found: list[int] = []
+    with closing(sqlite3.connect(path, isolation_level=None)) as holder:
+        holder.execute("BEGIN IMMEDIATE")
+        thread = threading.Thread(target=lambda: found.append(store.revision(sid)))
+        thread.start()
+        thread.join(0.3)
+        assert thread.is_alive()
+        assert store.revision(other) == 0
+        assert found == []
+        holder.execute("ROLLBACK")
+    thread.join(30)
+    assert found == [0]
+
+
 def test_a_locked_database_is_said_in_words(store: SessionStore, sid: str, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("ars_web.sessions.database.BUSY_MS", 50)
     with closing(sqlite3.connect(store.folder / sid / "session.sqlite", isolation_level=None)) as other:
