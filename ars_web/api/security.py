@@ -29,6 +29,9 @@ OPEN_PATHS = frozenset({"/", "/login", "/api/health"})
 
 OPEN_FOLDER = "/static/"
 
+SMALL_BODY = 64 * 1024
+"""Bytes that a refused request may still send, so that its sender gets to read the answer."""
+
 CONTENT_SECURITY_POLICY = "; ".join(
     [
         "default-src 'none'",
@@ -124,6 +127,9 @@ class Guard:
             if scope["type"] == "websocket":
                 await send({"type": "websocket.close", "code": 1008, "reason": str(refused)})
                 return
+            if _sends_much(Headers(scope=scope)):
+                # Otherwise the server would go on reading what it throws away, for as long as the stranger sends.
+                refused.response.headers["Connection"] = "close"
             await refused.response(scope, receive, send_guarded)
             return
         await self.app(scope, receive, send_guarded)
@@ -207,6 +213,11 @@ def who(door: Door, headers: Headers) -> str | None:
         if browser is not None:
             return f"page-{browser}"
     return None
+
+
+def _sends_much(headers: Headers) -> bool:
+    declared = headers.get("content-length", "0")
+    return "transfer-encoding" in headers or not declared.isdigit() or int(declared) > SMALL_BODY
 
 
 def _add_headers(message: Message, path: str) -> None:

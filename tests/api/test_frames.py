@@ -34,7 +34,9 @@ def test_frames_come_in_pages(client: httpx.Client, sid: str) -> None:
     assert frame.T_world_camera.wxyz == (1, 0, 0, 0)
 
 
-@pytest.mark.parametrize("query", ["offset=-1", "offset=9007199254740992", "limit=0", "limit=10001", "limit=x", "offset=1.5"])
+@pytest.mark.parametrize(
+    "query", ["offset=-1", "offset=9007199254740992", "limit=0", "limit=10001", "limit=x", "offset=1.5"]
+)
 def test_a_page_that_cannot_be_is_refused(client: httpx.Client, sid: str, query: str) -> None:
     assert client.get(f"/api/sessions/{sid}/frames?{query}").status_code == 422
 
