@@ -26,14 +26,15 @@ class LensTables:
 
     Attributes:
         lens: its numbers.
-        bends: (2, BINS) bounds on the second derivative of the lens, in pixels: over radii up to the end of a bin,
-            and over radii from its start to the rim. Bin i ends at rim * exp((i + 1 - BINS) / lens.bins_per_e).
+        bends: (3, BINS) bounds on the second derivative of a straight line's image, in pixels: across its chords,
+            over radii up to the end of a bin; the same over radii from its start to the rim; in any direction, over
+            radii up to its end. Bin i ends at rim * exp((i + 1 - BINS) / lens.bins_per_e).
         image_corners: (4, 2) the image's corners (0, 0), (W, 0), (0, H), (W, H) in the normalised plane, NaN where
             no ray of the lens ends in one.
     """
 
     lens: Lens
-    bends: Float[np.ndarray, "2 bins"]
+    bends: Float[np.ndarray, "3 bins"]
     image_corners: Float[np.ndarray, "4 2"]
 
 
@@ -67,66 +68,73 @@ def lens_tables(camera: Camera) -> LensTables:
         rim_bend=scale * _rim_bend(camera),
         bins_per_e=BINS / -math.log(RADIUS_RANGE),
     )
-    bends = scale * _bends_in_bins(camera)
     return LensTables(
         lens,
-        np.stack([np.maximum.accumulate(bends), np.maximum.accumulate(bends[::-1])[::-1]]),
+        np.ascontiguousarray(scale * _bends_in_bins(camera)),
         np.ascontiguousarray(cameras.normalised_from_pixels(camera, cameras.pixels_from_image(corners))),
     )
 
 
-def _bends_in_bins(camera: Camera) -> Float[np.ndarray, "bins"]:
-    """Bound on the second derivative of the distorted point along any straight line, over each bin of radii."""
-    samples = 8
-    steps = np.linspace(0.0, 1.0, BINS * samples + 1)
-    radii = camera.valid_radius * RADIUS_RANGE ** (1.0 - steps)
-    bend = _bend(camera, radii)
-    within = np.stack([bend[i : i + BINS * samples : samples] for i in range(samples + 1)])
-    return BEND_MARGIN * within.max(axis=0)
+def _bends_in_bins(camera: Camera) -> Float[np.ndarray, "3 bins"]:
+    """The bounds of `LensTables.bends`, in the normalised plane.
 
-
-def _bend(camera: Camera, r: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
-    """Largest length of the second derivative of f(x) = x g(|x|) at radius r over all directions.
-
-    With rho(r) = r g(r) and a direction at the angle a to the radius, its radial part is
-    cos^2 a rho'' + sin^2 a g' and its tangential part 2 sin a cos a g'. Brown's tangential terms add at most 6 |p|.
+    With f(x) = x g(|x|) and a direction d, f'' = 2 g' cos(a) d + (g' sin^2 a + r g'' cos^2 a) e, where e is the radial
+    direction and a its angle to d. So |f''| <= 3 G with G = max(|g'|, |r g''|), and across a chord that is turned from
+    d by the angle b it is at most (1 + 3 sin b) G. The two stretches of f, rho' and g, turn no direction by more than
+    sin b = |rho' - g| / (rho' + g). Brown's tangential terms add at most 6 |p| to f'', and 8 |p| r to rho' - g.
     """
-    _, slope, second = _radial(camera, r)
-    g_slope = slope / r - _radial(camera, r)[0] / r**2
-    if camera.model != "fisheye":
-        # rho / r - rho' is a difference of two numbers near 1, so the polynomial's own derivative is taken.
-        k1, k2, k3 = _brown_radial(camera)
-        g_slope = 2 * r * (k1 + r**2 * (2 * k2 + r**2 * 3 * k3))
-    angle = np.linspace(0.0, np.pi / 2, 33)[:, None]
-    c, s = np.cos(angle), np.sin(angle)
-    return np.hypot(c * c * second + s * s * g_slope, 2 * s * c * g_slope).max(axis=0) + 6 * _tangential(camera)
+    samples = 8
+    r = camera.valid_radius * RADIUS_RANGE ** (1.0 - np.linspace(0.0, 1.0, BINS * samples + 1))
+    g, g_slope, g_second = _radial(camera, r)
+    rho_slope, shear = g + r * g_slope, 8 * _tangential(camera) * r
+    turn = np.abs(rho_slope - g) + shear
+    turn = turn / np.maximum(rho_slope + g - shear, turn)
+    steepest, turn = _largest_in_bins(np.maximum(np.abs(g_slope), np.abs(r * g_second))), _largest_in_bins(turn)
+    bounds = [
+        _up_to(steepest) * (1 + 3 * _up_to(turn)),
+        _from_on(steepest) * (1 + 3 * _from_on(turn)),
+        3 * _up_to(steepest),
+    ]
+    return BEND_MARGIN * np.stack(bounds) + 6 * _tangential(camera)
+
+
+def _largest_in_bins(samples: Float[np.ndarray, "n"]) -> Float[np.ndarray, "bins"]:
+    """The largest sample of each bin, both its ends included."""
+    each = (len(samples) - 1) // BINS
+    return np.stack([samples[i : i + BINS * each : each] for i in range(each + 1)]).max(axis=0)
+
+
+def _up_to(bins: Float[np.ndarray, "bins"]) -> Float[np.ndarray, "bins"]:
+    return np.maximum.accumulate(bins)
+
+
+def _from_on(bins: Float[np.ndarray, "bins"]) -> Float[np.ndarray, "bins"]:
+    return np.maximum.accumulate(bins[::-1])[::-1]
 
 
 def _rim_bend(camera: Camera) -> float:
     """Bound on the second derivative of the distorted rim by its angle: |f''| r^2 + |f'| r."""
     r = np.array([camera.valid_radius])
-    rho, slope, _ = _radial(camera, r)
-    stretch = np.maximum(np.abs(rho / r), np.abs(slope)) + 6 * _tangential(camera) * r
-    return float((_bend(camera, r) * r**2 + stretch * r)[0])
+    g, g_slope, g_second = _radial(camera, r)
+    bend = 3 * np.maximum(np.abs(g_slope), np.abs(r * g_second)) + 6 * _tangential(camera)
+    stretch = np.maximum(np.abs(g), np.abs(g + r * g_slope)) + 6 * _tangential(camera) * r
+    return float((bend * r**2 + stretch * r)[0])
 
 
 def _radial(
     camera: Camera, r: Float[np.ndarray, "n"]
 ) -> tuple[Float[np.ndarray, "n"], Float[np.ndarray, "n"], Float[np.ndarray, "n"]]:
-    """The distorted radius of undistorted radii, and its first and second derivative."""
+    """g(r), the factor by which the lens moves a point at the radius r, and its first two derivatives by r."""
     if camera.model == "fisheye":
+        k1, k2, k3, k4 = camera.distortion
         theta, cos2 = np.arctan(r), 1.0 / (1.0 + r * r)
-        polynomial = np.polynomial.Polynomial([0.0, 1.0, *np.ravel([[0.0, k] for k in camera.distortion])])
-        slope = polynomial.deriv()(theta)
-        return polynomial(theta), slope * cos2, (polynomial.deriv(2)(theta) - 2 * r * slope) * cos2**2
-    k1, k2, k3 = _brown_radial(camera)
-    polynomial = np.polynomial.Polynomial([0.0, 1.0, 0.0, k1, 0.0, k2, 0.0, k3])
-    return polynomial(r), polynomial.deriv()(r), polynomial.deriv(2)(r)
-
-
-def _brown_radial(camera: Camera) -> tuple[float, float, float]:
-    """k1, k2, k3; zeros for a pinhole."""
-    return (camera.distortion[0], camera.distortion[1], camera.distortion[4]) if camera.distortion else (0.0, 0.0, 0.0)
+        polynomial = np.polynomial.Polynomial([0.0, 1.0, 0.0, k1, 0.0, k2, 0.0, k3, 0.0, k4])
+        g, slope = polynomial(theta) / r, polynomial.deriv()(theta)
+        g_slope = (slope * cos2 - g) / r
+        return g, g_slope, ((polynomial.deriv(2)(theta) - 2 * r * slope) * cos2**2 - 2 * g_slope) / r
+    k1, k2, _, _, k3 = camera.distortion or (0.0, 0.0, 0.0, 0.0, 0.0)
+    g = np.polynomial.Polynomial([1.0, 0.0, k1, 0.0, k2, 0.0, k3])
+    return g(r), g.deriv()(r), g.deriv(2)(r)
 
 
 def _tangential(camera: Camera) -> float:

@@ -17,6 +17,9 @@ Array = np.ndarray
 LONGEST_CURVE = 1024
 """Points on one straight piece, however much it bends."""
 
+MOST_CHORDS = 24
+"""On a stretch over which one bound on the bend is used."""
+
 LONGEST_QUARTER = 1024
 """Points on a quarter of the rim."""
 
@@ -57,20 +60,42 @@ class Lens(NamedTuple):
 
 
 @njit(error_model="numpy", forceinline=True)
-def image_point(lens: Lens, x: float, y: float) -> tuple[float, float]:
-    """Image coordinates of a point of the normalised plane within the rim (camera.pixels_from_normalised)."""
+def brown_point(lens: Lens, x: float, y: float) -> tuple[float, float]:
+    """Image coordinates of a point of the normalised plane within the rim of a Brown or pinhole camera."""
     r2 = x * x + y * y
-    if lens.fisheye:
-        r = math.sqrt(r2)
-        theta = math.atan(r)
-        t2 = theta * theta
-        bent = theta * (1.0 + t2 * (lens.k1 + t2 * (lens.k2 + t2 * (lens.k3 + t2 * lens.k4))))
-        scale = bent / r if r > 1e-12 else 1.0
-        return lens.fx * x * scale + lens.cx, lens.fy * y * scale + lens.cy
     radial = 1.0 + r2 * (lens.k1 + r2 * (lens.k2 + r2 * lens.k3))
     u = x * radial + 2.0 * lens.p1 * x * y + lens.p2 * (r2 + 2.0 * x * x)
     v = y * radial + lens.p1 * (r2 + 2.0 * y * y) + 2.0 * lens.p2 * x * y
     return lens.fx * u + lens.cx, lens.fy * v + lens.cy
+
+
+@njit(error_model="numpy")
+def fisheye_point(lens: Lens, x: float, y: float) -> tuple[float, float]:
+    """Image coordinates of a point of the normalised plane within the rim of a fisheye camera."""
+    r = math.sqrt(x * x + y * y)
+    theta = math.atan(r)
+    t2 = theta * theta
+    bent = theta * (1.0 + t2 * (lens.k1 + t2 * (lens.k2 + t2 * (lens.k3 + t2 * lens.k4))))
+    scale = bent / r if r > 1e-12 else 1.0
+    return lens.fx * x * scale + lens.cx, lens.fy * y * scale + lens.cy
+
+
+@njit(error_model="numpy", forceinline=True)
+def image_point(lens: Lens, x: float, y: float) -> tuple[float, float]:
+    """Image coordinates of a point of the normalised plane within the rim (camera.pixels_from_normalised)."""
+    return fisheye_point(lens, x, y) if lens.fisheye else brown_point(lens, x, y)
+
+
+@njit(error_model="numpy")
+def sample(lens: Lens, x: float, y: float, dx: float, dy: float, n: int, points: Array) -> None:
+    """Image coordinates of the n points (x + i dx, y + i dy), i from 1, written to `points`."""
+    # Two loops, because the processor takes several points at a time only where none needs an arc tangent.
+    if lens.fisheye:
+        for i in range(n):
+            points[i, 0], points[i, 1] = fisheye_point(lens, x + (i + 1) * dx, y + (i + 1) * dy)
+    else:
+        for i in range(n):
+            points[i, 0], points[i, 1] = brown_point(lens, x + (i + 1) * dx, y + (i + 1) * dy)
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -84,17 +109,50 @@ def bend_bin(lens: Lens, bends: Array, r: float) -> int:
 
 
 @njit(error_model="numpy")
+def polygon_bend(lens: Lens, bends: Array, bound: int, xy: Array, n: int) -> float:
+    """One of the bounds in the bend table for all that a polygon holds within the rim."""
+    r2 = 0.0
+    for i in range(n):
+        r2 = max(r2, xy[i, 0] * xy[i, 0] + xy[i, 1] * xy[i, 1])
+    return bends[bound, bend_bin(lens, bends, math.sqrt(r2))]
+
+
+@njit(error_model="numpy")
 def append_curve(
-    lens: Lens, bends: Array, x0: float, y0: float, x1: float, y1: float, tolerance: float, points: Array, m: int
+    lens: Lens,
+    bends: Array,
+    bend: float,
+    x0: float,
+    y0: float,
+    x1: float,
+    y1: float,
+    tolerance: float,
+    points: Array,
+    m: int,
 ) -> int:
     """Append the image of a straight piece within the rim to `points` after the first m, its start left out.
 
-    A chord over a length L is off by at most max|f''| L^2 / 8. The bound on f'' holds over a range of radii, so long
-    pieces are taken in stretches over which it is about the same.
+    A chord over a length L is off by at most max|f''| L^2 / 8, where f'' counts across the chord. `bend` bounds it.
     """
     dx, dy = x1 - x0, y1 - y0
+    sagitta = bend * (dx * dx + dy * dy) / 8.0
+    if sagitta > MOST_CHORDS * MOST_CHORDS * tolerance:
+        return append_long_curve(lens, bends, x0, y0, x1, y1, tolerance, points, m)
+    n = max(math.ceil(math.sqrt(sagitta / tolerance)), 1)
+    sample(lens, x0, y0, dx / n, dy / n, n - 1, points[m:])
+    points[m + n - 1, 0], points[m + n - 1, 1] = image_point(lens, x1, y1)
+    return m + n
+
+
+@njit(error_model="numpy")
+def append_long_curve(
+    lens: Lens, bends: Array, x0: float, y0: float, x1: float, y1: float, tolerance: float, points: Array, m: int
+) -> int:
+    """The same for a piece so long that one bound on f'' is too much for most of it: it is taken in stretches, each
+    with the bound for its own range of radii, and with more tolerance far from the image."""
+    dx, dy = x1 - x0, y1 - y0
     length2 = dx * dx + dy * dy
-    nearest = -(x0 * dx + y0 * dy) / length2 if length2 > 0.0 else 0.0
+    nearest = -(x0 * dx + y0 * dy) / length2
     limit = m + LONGEST_CURVE
     s, stretch = 0.0, 1.0
     u, v = image_point(lens, x0, y0)
@@ -107,19 +165,16 @@ def append_curve(
         r_high = max(math.hypot(x0 + s * dx, y0 + s * dy), math.hypot(x_end, y_end))
         bend = min(bends[0, bend_bin(lens, bends, r_high)], bends[1, bend_bin(lens, bends, r_low)])
         sagitta = bend * length2 * (s_end - s) ** 2 / 8.0
-        n = 1
-        if sagitta > tolerance:
-            away_u = max(min(u, u_end) - sagitta - lens.width, -max(u, u_end) - sagitta)
-            away_v = max(min(v, v_end) - sagitta - lens.height, -max(v, v_end) - sagitta)
-            n = int(min(math.ceil(math.sqrt(sagitta / (tolerance + FAR_TOLERANCE * max(away_u, away_v, 0.0)))), 1e6))
-        if n > 16 and stretch > 2e-4:
+        away_u = max(min(u, u_end) - sagitta - lens.width, -max(u, u_end) - sagitta)
+        away_v = max(min(v, v_end) - sagitta - lens.height, -max(v, v_end) - sagitta)
+        n = math.ceil(min(math.sqrt(sagitta / (tolerance + FAR_TOLERANCE * max(away_u, away_v, 0.0))), 1e6))
+        if n > MOST_CHORDS and stretch > 2e-4:
             stretch *= 0.5
             continue
         n = max(min(n, limit - m), 1)
-        for i in range(1, n):
-            s_i = s + (s_end - s) * i / n
-            points[m, 0], points[m, 1] = image_point(lens, x0 + s_i * dx, y0 + s_i * dy)
-            m += 1
+        part = (s_end - s) / n
+        sample(lens, x0 + s * dx, y0 + s * dy, part * dx, part * dy, n - 1, points[m:])
+        m += n - 1
         if m >= limit:
             s_end = 1.0
             u_end, v_end = image_point(lens, x1, y1)
@@ -173,7 +228,7 @@ def within_rim(lens: Lens, x0: float, y0: float, x1: float, y1: float) -> tuple[
 @njit(error_model="numpy")
 def outline_ring(lens: Lens, bends: Array, xy: Array, n: int, tolerance: float, points: Array) -> int:
     """The image of a convex polygon cut to the rim, as a ring written to `points`; how many, 0 for none."""
-    m = 0
+    m, bend = 0, polygon_bend(lens, bends, 0, xy, n)
     last_x, last_y, last_cut = 0.0, 0.0, False
     first_x, first_y, first_cut = 0.0, 0.0, False
     for i in range(n):
@@ -190,7 +245,7 @@ def outline_ring(lens: Lens, bends: Array, xy: Array, n: int, tolerance: float, 
             m = 1
         elif low > 0.0 or last_cut:
             m = append_arc_between(lens, last_x, last_y, xs, ys, tolerance, points, m)
-        m = append_curve(lens, bends, xs, ys, xe, ye, tolerance, points, m)
+        m = append_curve(lens, bends, bend, xs, ys, xe, ye, tolerance, points, m)
         last_x, last_y, last_cut = xe, ye, high < 1.0
     if m == 0:
         return append_arc(lens, 0.0, 2.0 * math.pi, tolerance, points, 0) if holds(xy, n, 0.0, 0.0) else 0
@@ -251,6 +306,8 @@ def area_in_image(lens: Lens, u0: float, v0: float, u1: float, v1: float) -> flo
     image's height, over the part of u within its width. Its sum over any ring is the signed area."""
     if u0 == u1 or (u0 <= 0.0 and u1 <= 0.0) or (u0 >= lens.width and u1 >= lens.width):
         return 0.0
+    if v0 >= lens.height and v1 >= lens.height:
+        return lens.height * (min(max(u1, 0.0), lens.width) - min(max(u0, 0.0), lens.width))
     slope = (v1 - v0) / (u1 - u0)
     ua, ub = min(max(u0, 0.0), lens.width), min(max(u1, 0.0), lens.width)
     va, vb = v0 + slope * (ua - u0), v0 + slope * (ub - u0)
@@ -287,32 +344,28 @@ def amodal_bbox(lens: Lens, bends: Array, xy: Array, n: int, tolerance: float, p
     Along a piece with ends du apart and a sagitta s, u goes beyond its ends by at most s (1 - |du| / 4s)^2, and not
     at all where |du| >= 4 s.
     """
-    r2 = 0.0
-    for i in range(n):
-        r2 = max(r2, xy[i, 0] * xy[i, 0] + xy[i, 1] * xy[i, 1])
-    if not r2 < lens.rim * lens.rim:
-        return False
     start_bbox(bbox)
     for i in range(n):
+        if not xy[i, 0] * xy[i, 0] + xy[i, 1] * xy[i, 1] < lens.rim * lens.rim:
+            return False
         u, v = image_point(lens, xy[i, 0], xy[i, 1])
         points[i, 0], points[i, 1] = u, v
         grow_bbox(bbox, u, v)
-    bend = bends[0, bend_bin(lens, bends, math.sqrt(r2))]
-    slack = 0.5 * tolerance
+    bend, any_bend = polygon_bend(lens, bends, 0, xy, n), polygon_bend(lens, bends, 2, xy, n)
     for i in range(n):
         j = i + 1 if i + 1 < n else 0
-        sagitta = bend * ((xy[j, 0] - xy[i, 0]) ** 2 + (xy[j, 1] - xy[i, 1]) ** 2) / 8.0
-        if sagitta <= slack:
+        sagitta = any_bend * ((xy[j, 0] - xy[i, 0]) ** 2 + (xy[j, 1] - xy[i, 1]) ** 2) / 8.0
+        if sagitta <= tolerance:
             continue
-        beyond_u = sagitta * max(1.0 - abs(points[j, 0] - points[i, 0]) / (4.0 * sagitta), 0.0) ** 2 - slack
-        beyond_v = sagitta * max(1.0 - abs(points[j, 1] - points[i, 1]) / (4.0 * sagitta), 0.0) ** 2 - slack
+        beyond_u = sagitta * max(1.0 - abs(points[j, 0] - points[i, 0]) / (4.0 * sagitta), 0.0) ** 2 - tolerance
+        beyond_v = sagitta * max(1.0 - abs(points[j, 1] - points[i, 1]) / (4.0 * sagitta), 0.0) ** 2 - tolerance
         if (
             min(points[i, 0], points[j, 0]) - beyond_u < bbox[0]
             or max(points[i, 0], points[j, 0]) + beyond_u > bbox[2]
             or min(points[i, 1], points[j, 1]) - beyond_v < bbox[1]
             or max(points[i, 1], points[j, 1]) + beyond_v > bbox[3]
         ):
-            m = append_curve(lens, bends, xy[i, 0], xy[i, 1], xy[j, 0], xy[j, 1], slack, points, n)
+            m = append_curve(lens, bends, bend, xy[i, 0], xy[i, 1], xy[j, 0], xy[j, 1], tolerance, points, n)
             for k in range(n, m):
                 grow_bbox(bbox, points[k, 0], points[k, 1])
     return True
@@ -323,16 +376,25 @@ def label_of_ring(lens: Lens, image_corners: Array, xy: Array, n: int, points: A
     """The box of the part of a ring's inside that lies in the image, written to `bbox`, and the share of its area
     that does not. `xy` is the polygon whose image the ring is; image corners that it holds are corners of the part."""
     start_bbox(bbox)
+    width, height = lens.width, lens.height
     whole, part = 0.0, 0.0
+    u0, v0 = points[m - 1, 0], points[m - 1, 1]
+    inside_before = 0.0 <= u0 <= width and 0.0 <= v0 <= height
     for i in range(m):
-        j = i + 1 if i + 1 < m else 0
-        u0, v0, u1, v1 = points[i, 0], points[i, 1], points[j, 0], points[j, 1]
-        whole += 0.5 * (v0 + v1) * (u1 - u0)
-        part += area_in_image(lens, u0, v0, u1, v1)
-        low, high = in_image(lens, u0, v0, u1, v1)
-        if low <= high:
-            for s in (low, high):
-                grow_bbox(bbox, u0 + s * (u1 - u0), v0 + s * (v1 - v0))
+        u1, v1 = points[i, 0], points[i, 1]
+        area = 0.5 * (v0 + v1) * (u1 - u0)
+        whole += area
+        inside = 0.0 <= u1 <= width and 0.0 <= v1 <= height
+        if inside and inside_before:
+            part += area
+            grow_bbox(bbox, u1, v1)
+        elif not ((u0 <= 0.0 and u1 <= 0.0) or (u0 >= width and u1 >= width) or (v0 <= 0.0 and v1 <= 0.0)):
+            part += area_in_image(lens, u0, v0, u1, v1)
+            low, high = in_image(lens, u0, v0, u1, v1)
+            if low <= high:
+                grow_bbox(bbox, u0 + low * (u1 - u0), v0 + low * (v1 - v0))
+                grow_bbox(bbox, u0 + high * (u1 - u0), v0 + high * (v1 - v0))
+        u0, v0, inside_before = u1, v1, inside
     for i in range(4):
         if holds(xy, n, image_corners[i, 0], image_corners[i, 1]):
             grow_bbox(bbox, lens.width * (i % 2), lens.height * (i // 2))
@@ -361,7 +423,8 @@ def label_shadows(
     `image_corners` (4, 2): the image's corners (0, 0), (W, 0), (0, H), (W, H) in the normalised plane, NaN where no
     ray of the lens ends in one.
     """
-    points = np.empty((CAPACITY, 2))
+    # Copies, because threads that count the users of one array stand in each other's way.
+    bends, image_corners, points = bends.copy(), image_corners.copy(), np.empty((CAPACITY, 2))
     for frame in range(corners.shape[0]):
         for box in range(corners.shape[1]):
             part, whole = bbox[frame, box], bbox_amodal[frame, box]
@@ -378,6 +441,7 @@ def label_shadows(
                     continue
             m = outline_ring(lens, bends, xy, n, tolerance, points)
             if m < 3:
+                whole[:] = np.nan
                 continue
             start_bbox(whole)
             for i in range(m):
@@ -390,6 +454,8 @@ def rings_of_shadows(
     lens: Lens, bends: Array, polygons: Array, corners: Array, wanted: Array, tolerance: float
 ) -> tuple[Array, Array]:
     """Rings round n x b shadows, those that are `wanted` (n, b): all points (k, 2), and (n * b,) how many each has."""
+    # A copy, because threads that count the users of one array stand in each other's way.
+    bends = bends.copy()
     frames, boxes = corners.shape
     lengths = np.zeros(frames * boxes, np.int64)
     ring = np.empty((CAPACITY, 2))
@@ -414,6 +480,7 @@ def rings_of_shadows(
 def curves_of_edges(lens: Lens, bends: Array, edges: Array, tolerance: float) -> tuple[Array, Array]:
     """Images of straight pieces (n, 2, 2), cut to the rim and the image: all points (k, 2), and how many each curve
     has; a piece gives no curve, one, or more where the lens bends it out of the image and back."""
+    bend = polygon_bend(lens, bends, 0, edges.reshape((-1, 2)), 2 * len(edges))
     curve = np.empty((CAPACITY, 2))
     found = np.empty((2 * CAPACITY, 2))
     lengths = np.zeros(2 * CAPACITY, np.int64)
@@ -425,7 +492,7 @@ def curves_of_edges(lens: Lens, bends: Array, edges: Array, tolerance: float) ->
             continue
         xs, ys, xe, ye = x0 + low * (x1 - x0), y0 + low * (y1 - y0), x0 + high * (x1 - x0), y0 + high * (y1 - y0)
         curve[0, 0], curve[0, 1] = image_point(lens, xs, ys)
-        m = append_curve(lens, bends, xs, ys, xe, ye, tolerance, curve, 1)
+        m = append_curve(lens, bends, bend, xs, ys, xe, ye, tolerance, curve, 1)
         joined = False
         for i in range(m - 1):
             u, v = curve[i, 0], curve[i, 1]

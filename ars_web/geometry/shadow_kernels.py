@@ -124,6 +124,8 @@ def cast_shadows(
 ) -> None:
     """The shadows of b boxes in n frames, written to `polygons` (n, b, MOST_CORNERS, 2); each one's number of corners,
     0 where nothing is in front, to `corners` (n, b)."""
+    # Copies, because threads that count the users of one array stand in each other's way.
+    Ts_world_box, halves, rings = Ts_world_box.copy(), halves.copy(), rings.copy()
     R, t = np.empty((3, 3)), np.empty(3)
     for frame in range(len(Ts_world_camera)):
         for box in range(len(halves)):
