@@ -4,7 +4,12 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 from jaxtyping import install_import_hook
+
+# Property tests look at what is answered, not at how busy the machine is.
+settings.register_profile("untimed", deadline=None)
+settings.load_profile("untimed")
 
 # Every annotated shape in geometry/ is checked while the tests run. Kernel modules hold numba code, which takes
 # no such wrapper.

@@ -1,6 +1,5 @@
 """One session's SQLite database: how it is opened, how a transaction begins, and what its failures mean."""
 
-import sqlite3
 import threading
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -8,12 +7,11 @@ from pathlib import Path
 
 from sqlalchemy import Connection, create_engine, event
 from sqlalchemy.engine.interfaces import DBAPIConnection
-from sqlalchemy.exc import DatabaseError, NoResultFound, OperationalError
-from sqlalchemy.exc import TimeoutError as PoolTimeout
 from sqlalchemy.pool import ConnectionPoolEntry, QueuePool
 
 from ars_web.errors import NotFound, StoreError
 from ars_web.sessions import migration
+from ars_web.sessions.sqlite import NO_DATABASE, database_url, explained
 
 BUSY_MS = 20_000
 """How long a writer waits for another process's transaction before it gives up."""
@@ -31,7 +29,7 @@ class Database:
         self._inode = _inode(path)
         self._closed = False
         self._engine = create_engine(
-            migration.database_url(path), poolclass=QueuePool, pool_size=2, max_overflow=62, pool_timeout=BUSY_MS / 1000
+            database_url(path), poolclass=QueuePool, pool_size=2, max_overflow=62, pool_timeout=BUSY_MS / 1000
         )
         event.listen(self._engine, "connect", _configure)
         event.listen(self._engine, "begin", _begin)
@@ -41,10 +39,9 @@ class Database:
             with self._connect(write=False) as connection:
                 schema = migration.schema_of(connection)
             if schema is None:
-                raise StoreError(f"{path}: {_REMEDIES['not a database']}")
+                raise StoreError(f"{path}: {NO_DATABASE}")
             if schema != migration.SCHEMA:
-                with explained(path):
-                    migration.bring_up_to_date(path)
+                migration.bring_up_to_date(path)
         except BaseException:
             self.close()
             raise
@@ -126,39 +123,3 @@ def _configure(connection: DBAPIConnection, record: ConnectionPoolEntry) -> None
 def _begin(connection: Connection) -> None:
     write = connection.get_execution_options().get("ars_write", False)
     connection.exec_driver_sql("BEGIN IMMEDIATE" if write else "BEGIN")
-
-
-@contextmanager
-def explained(path: Path) -> Generator[None]:
-    """Say in words, and with the remedy, what SQLite says in codes."""
-    try:
-        yield
-    except PoolTimeout as error:
-        raise StoreError(f"{path}: too many requests at once; try again") from error
-    except NoResultFound as error:
-        raise StoreError(f"{path}: a row that must be there is not: {_REMEDIES['malformed']}") from error
-    except sqlite3.Error as error:
-        raise StoreError(f"{path}: {_remedy(str(error))}") from error
-    except DatabaseError as error:
-        # Its other children (a broken constraint, a wrong statement) would be mistakes of this program.
-        if not isinstance(error, OperationalError) and type(error) is not DatabaseError:
-            raise
-        raise StoreError(f"{path}: {_remedy(str(error.orig))}") from error
-
-
-_REMEDIES = {
-    "full": "the disk is full; nothing of this change was kept. Free some space and try again",
-    "locked": "another program holds the session's database; try again when it is done",
-    "readonly": "the session cannot be written; check the folder's permissions",
-    "unable to open": "the session's database cannot be opened; check the folder's permissions",
-    "disk I/O": "the disk refused a read or write; check its space and health",
-    "malformed": "the database is damaged; bring back the newest session.sqlite.before-* or a session export",
-    "not a database": "this is no session database; bring back session.sqlite from a backup or a session export",
-}
-
-
-def _remedy(said: str) -> str:
-    for sign, remedy in _REMEDIES.items():
-        if sign in said:
-            return f"{remedy} (SQLite: {said})"
-    return f"SQLite: {said}"

@@ -6,11 +6,13 @@ import threading
 from contextlib import closing
 from pathlib import Path
 
-from sqlalchemy import URL, Connection, create_engine, event, text
+from sqlalchemy import Connection, create_engine, event, text
 from sqlalchemy.engine.interfaces import DBAPIConnection
+from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.pool import ConnectionPoolEntry, NullPool
 
 from ars_web.errors import StoreError
+from ars_web.sessions.sqlite import database_url, explained
 
 SCHEMA = "0002"
 """The newest step under `migrations/versions`. A constant, so that opening a session does not load Alembic."""
@@ -31,34 +33,27 @@ def bring_up_to_date(path: Path, *, scripts: Path = SCRIPTS, target: str = SCHEM
     """
     engine = create_engine(database_url(path), poolclass=NullPool)
     event.listen(engine, "connect", _begin_by_hand)
-    with engine.connect() as connection:
+    # Leaving the connection without COMMIT takes everything back.
+    with explained(path), engine.connect() as connection:
         connection.exec_driver_sql("BEGIN IMMEDIATE")
         # Asked again within the transaction: another process may have migrated it meanwhile.
         found = schema_of(connection)
         if found == target:
             return
-        if found is not None:
+        if found is None:
+            _run_steps(connection, scripts, target)
+        else:
             _refuse_newer(found, path, scripts)
             back_up(path, path.with_name(f"{path.name}.before-{target}"))
-        try:
-            _run_steps(connection, scripts, target)
-            broken = connection.exec_driver_sql("PRAGMA foreign_key_check").all()
-            if broken:
-                raise StoreError(f"{path}: rows without the row they refer to after migrating: {broken[:3]}")
-        except Exception as error:
-            connection.exec_driver_sql("ROLLBACK")
-            if found is None:
-                raise
-            raise StoreError(
-                f"{path}: migrating from schema {found} to {target} failed and was taken back: {error};"
-                f" a copy is at {path.name}.before-{target}"
-            ) from error
+            try:
+                _run_steps(connection, scripts, target)
+                _refuse_broken_links(connection)
+            except (SQLAlchemyError, StoreError) as error:
+                raise StoreError(
+                    f"{path}: migrating from schema {found} to {target} failed and was taken back: {error};"
+                    f" a copy is at {path.name}.before-{target}"
+                ) from error
         connection.exec_driver_sql("COMMIT")
-
-
-def database_url(path: Path) -> URL:
-    """SQLAlchemy's name for a database file, whatever characters its path has."""
-    return URL.create("sqlite", database=str(path))
 
 
 def schema_of(connection: Connection) -> str | None:
@@ -77,9 +72,12 @@ def back_up(source: Path, target: Path) -> None:
         old.backup(new)
         # A copied WAL database would want its side files back; alone it is to be one file.
         new.execute("PRAGMA journal_mode = DELETE")
-    with partial.open("rb+") as file:
-        os.fsync(file.fileno())
-    partial.replace(target)
+    try:
+        with partial.open("rb+") as file:
+            os.fsync(file.fileno())
+        partial.replace(target)
+    except OSError as error:
+        raise StoreError(f"{target}: the database cannot be copied here: {error.strerror}") from error
 
 
 def _begin_by_hand(connection: DBAPIConnection, record: ConnectionPoolEntry) -> None:
@@ -100,6 +98,12 @@ def _run_steps(connection: Connection, scripts: Path, target: str) -> None:
     # Alembic keeps what it is doing in a module's globals: one thread at a time.
     with _ALEMBIC:
         command.upgrade(config, target)
+
+
+def _refuse_broken_links(connection: Connection) -> None:
+    broken = connection.exec_driver_sql("PRAGMA foreign_key_check").all()
+    if broken:
+        raise StoreError(f"rows are left without the row they refer to: {broken[:3]}")
 
 
 def _refuse_newer(found: str, path: Path, scripts: Path) -> None:

@@ -22,12 +22,13 @@ from ars_web.errors import BadFile, BadInput, RefusedPath, StoreError
 from ars_web.sessions import rows
 from ars_web.sessions.archive import DEFAULT_LIMITS, ArchiveLimits, extract_zip
 from ars_web.sessions.checking import check_database, check_portable, check_strange
-from ars_web.sessions.database import Database, explained
+from ars_web.sessions.database import Database
 from ars_web.sessions.edits import Edit, NameChange
 from ars_web.sessions.model import FrameTable, SessionSummary
 from ars_web.sessions.names import checked_name
 from ars_web.sessions.rows import IMAGES
 from ars_web.sessions.session_folders import DATABASE
+from ars_web.sessions.sqlite import explained
 from ars_web.sessions.store import SessionStore
 from ars_web.sessions.transaction import SessionTransaction
 

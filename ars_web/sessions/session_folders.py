@@ -85,36 +85,46 @@ def building(sessions: Path, sid: str) -> Generator[Path]:
     """
     with unseen_folder(sessions) as folder:
         yield folder
-        _sync(folder)
-        try:
-            folder.rename(sessions / sid)
-        except OSError as error:
-            if (sessions / sid).exists():
-                raise FileExistsError(sid) from error
-            raise StoreError(f"{sessions}: the new session cannot be put in place: {error.strerror}") from error
-        _sync(sessions)
+        with _in_words(sessions):
+            _sync(folder)
+            try:
+                folder.rename(sessions / sid)
+            except OSError as error:
+                if (sessions / sid).exists():
+                    raise FileExistsError(sid) from error
+                raise
+            _sync(sessions)
 
 
 @contextmanager
 def unseen_folder(sessions: Path) -> Generator[Path]:
     """An empty folder under SESSIONS/.building that is gone, if it still is there, when the block ends."""
     place = sessions / BUILDING
-    try:
+    with _in_words(sessions):
         place.mkdir(parents=True, exist_ok=True)
         lock = os.open(place / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
-    except OSError as error:
-        raise StoreError(f"{sessions}: the sessions folder cannot be written: {error.strerror}") from error
     try:
         # Shared among builders of all processes; the kernel lets go of it when one is killed.
         fcntl.flock(lock, fcntl.LOCK_SH)
         folder = place / secrets.token_hex(8)
-        folder.mkdir()
+        with _in_words(sessions):
+            folder.mkdir()
         try:
             yield folder
         finally:
             shutil.rmtree(folder, ignore_errors=True)
     finally:
         os.close(lock)
+
+
+@contextmanager
+def _in_words(sessions: Path) -> Generator[None]:
+    try:
+        yield
+    except FileExistsError:
+        raise
+    except OSError as error:
+        raise StoreError(f"{sessions}: the sessions folder cannot be written: {error.strerror}") from error
 
 
 def leftovers(sessions: Path) -> list[Path]:
@@ -146,9 +156,10 @@ def clean_up(sessions: Path) -> None:
 
 def put_away(sessions: Path, sid: str) -> None:
     """Move a session's folder to the trash."""
-    (sessions / TRASH).mkdir(exist_ok=True)
-    (sessions / sid).rename(sessions / TRASH / sid)
-    _sync(sessions)
+    with _in_words(sessions):
+        (sessions / TRASH).mkdir(exist_ok=True)
+        (sessions / sid).rename(sessions / TRASH / sid)
+        _sync(sessions)
 
 
 def bring_back(sessions: Path, sid: str) -> None:
@@ -162,8 +173,9 @@ def bring_back(sessions: Path, sid: str) -> None:
         raise NotFound(f"there is no session {sid!r} in the trash")
     if (sessions / sid).exists():
         raise BadInput(f"there is a session {sid!r} already; delete it first")
-    (sessions / TRASH / sid).rename(sessions / sid)
-    _sync(sessions)
+    with _in_words(sessions):
+        (sessions / TRASH / sid).rename(sessions / sid)
+        _sync(sessions)
 
 
 def is_put_away(sessions: Path, sid: str) -> bool:

@@ -17,12 +17,13 @@ from ars_web.geometry.camera import Camera
 from ars_web.recordings.recording import Recording, SkippedFrame
 from ars_web.sessions import rows, session_folders
 from ars_web.sessions.checking import check_session
-from ars_web.sessions.database import Database, explained
+from ars_web.sessions.database import Database
 from ars_web.sessions.edits import Edit, apply
 from ars_web.sessions.importing import fill, starting_state
 from ars_web.sessions.migration import back_up
 from ars_web.sessions.model import FrameTable, SessionSnapshot, SessionState, SessionSummary
 from ars_web.sessions.names import checked_key
+from ars_web.sessions.sqlite import explained
 from ars_web.sessions.transaction import SessionTransaction
 
 log = logging.getLogger(__name__)

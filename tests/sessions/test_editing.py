@@ -376,7 +376,7 @@ steps = st.lists(
 )
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(steps)
 def test_whatever_is_done_the_state_is_what_the_log_replays(
     store: SessionStore, make_recording: Callable[..., object], steps: list[tuple[str, str, int]]

@@ -93,7 +93,7 @@ def test_a_step_that_leaves_rows_without_what_they_refer_to_fails(
     shutil.copytree(migration.SCRIPTS, scripts, ignore=shutil.ignore_patterns("__pycache__"))
     step = scripts / "versions" / "0002_requests.py"
     step.write_text(step.read_text() + '    op.execute("DELETE FROM object_class")\n')
-    with pytest.raises(StoreError, match="rows without the row they refer to"):
+    with pytest.raises(StoreError, match="rows are left without the row they refer to"):
         migration.bring_up_to_date(path, scripts=scripts)
     assert dump(path) == before
 

@@ -329,7 +329,7 @@ def test_a_folder_that_cannot_be_is_a_store_error(tmp_path: Path, make_recording
     with SessionStore(tmp_path / "file") as store:
         with pytest.raises(StoreError, match="the sessions folder cannot be read"):
             store.list()
-        with pytest.raises(StoreError, match="the sessions folder cannot be written"):
+        with pytest.raises(StoreError, match="the sessions folder cannot be written: Not a directory"):
             store.create(make_recording(), name="s")
     with SessionStore(tmp_path / "absent") as store:
         assert store.list() == []
@@ -370,6 +370,24 @@ def test_a_full_disk_or_a_read_only_one_keeps_nothing_of_the_change(
     assert [edit.revision for edit in store.edits(sid)] == list(range(1, state.revision + 1))
     assert len(state.boxes) == state.revision
     assert editor.add_box(sid, class_id=0, box=a_box(), author="me").revision == state.revision + 1
+
+
+@pytest.mark.parametrize("pages", [1, 20])
+def test_an_import_that_finds_the_disk_full_leaves_nothing(
+    store: SessionStore, make_recording: MakeRecording, pages: int
+):
+    """With one page not even the tables can be made; with twenty the frames have no place."""
+
+    def limit(connection: sqlite3.Connection, record: object) -> None:
+        connection.execute(f"PRAGMA max_page_count = {pages}")
+
+    event.listen(Engine, "connect", limit)
+    try:
+        with pytest.raises(StoreError, match="the disk is full"):
+            store.create(make_recording(2000), name="s")
+    finally:
+        event.remove(Engine, "connect", limit)
+    assert_nothing_left(store)
 
 
 TOO_LARGE = """
