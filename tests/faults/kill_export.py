@@ -41,7 +41,8 @@ def serve(sessions: str, *wanted: str) -> None:
         exports.resume_unfinished()
         if wanted:
             sid, kind = wanted
-            print(exports.start(sid, format=kind, options=OPTIONS).id, flush=True)
+            sys.stdout.write(exports.start(sid, format=kind, options=OPTIONS).id + "\n")
+            sys.stdout.flush()
         for job in exports.list():
             exports.wait(job.id)
         exports.close()

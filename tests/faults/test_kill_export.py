@@ -27,7 +27,8 @@ from ars_web.recordings.recording import Frame, Recording
 from ars_web.sessions.editing import BoxDraft, SessionEditor
 from ars_web.sessions.store import SessionStore
 
-SCRIPT = Path(__file__).parent / "kill_export.py"
+SCRIPT = Path(__file__).with_name("kill_export.py")
+CHECKOUT = Path(__file__).parents[2]
 FRAMES = 240
 PATIENCE = 120.0
 
@@ -79,7 +80,9 @@ def digests(folder: Path) -> dict[str, str]:
 def running(*arguments: object) -> Iterator[subprocess.Popen[str]]:
     """The script in a process; whatever is left of it and its workers ends with the block."""
     command = [sys.executable, str(SCRIPT), *map(str, arguments)]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    # The script runs the ars_web beside it, whether or not one is installed.
+    search = {**os.environ, "PYTHONPATH": str(CHECKOUT)}
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=search)
     seen: set[psutil.Process] = set()
     stop = threading.Event()
 
