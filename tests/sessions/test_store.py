@@ -475,6 +475,20 @@ def test_check_sees_what_the_log_does_not_explain(store: SessionStore, sid: str,
     assert f"1 images are not where they were, the first is {frames.images[1]}" in store.check()[1]
 
 
+def test_a_backup_brought_back_under_a_running_store_is_what_is_read(
+    store: SessionStore, editor: SessionEditor, sid: str, a_box: MakeBox, tmp_path: Path
+):
+    store.back_up(sid, tmp_path / "earlier.sqlite")
+    editor.add_box(sid, class_id=0, box=a_box(), author="me")
+    with (
+        closing(sqlite3.connect(tmp_path / "earlier.sqlite")) as earlier,
+        closing(sqlite3.connect(store.folder / sid / "session.sqlite")) as live,
+    ):
+        earlier.backup(live)
+    assert store.state(sid).boxes == {}
+    assert editor.add_box(sid, class_id=0, box=a_box(), author="me").revision == 1
+
+
 def test_one_session_that_is_slow_to_open_holds_up_no_other(
     store: SessionStore, make_recording: MakeRecording, sid: str
 ):
