@@ -24,6 +24,10 @@ EDGES: Int[np.ndarray, "12 2"] = np.array([(i, j) for i in range(8) for j in ran
 LARGEST_SIZE = 1e4
 """Metres. A side beyond this is a mistake in the unit, not an object."""
 
+FARTHEST = 1e7
+"""Metres from the world's origin along each axis. Beyond this the arithmetic of labels loses its last digits, and far
+beyond it overflows."""
+
 
 @dataclass(frozen=True, eq=False)
 class Box:
@@ -38,13 +42,16 @@ class Box:
     size: Float[np.ndarray, "3"]
 
     def __post_init__(self) -> None:
-        """Raises BadInput for a size that is not three positive finite lengths or a transform that is none."""
+        """Raises BadInput for a size that is not three positive finite lengths, or a transform that is none or leads
+        further than FARTHEST."""
         size = np.array(self.size, dtype=np.float64)
         if size.shape != (3,) or not np.isfinite(size).all() or (size <= 0).any() or (size > LARGEST_SIZE).any():
             raise BadInput(
                 f"a box's size must be three lengths in metres, each > 0, not {np.asarray(self.size).tolist()}"
             )
         T = rigid_transform.checked(self.T_world_box)
+        if (np.abs(T[:3, 3]) > FARTHEST).any():
+            raise BadInput(f"a box must be within {FARTHEST:g} m of the world's origin, not at {T[:3, 3].tolist()}")
         size.flags.writeable = False
         T.flags.writeable = False
         object.__setattr__(self, "size", size)
@@ -108,11 +115,14 @@ def from_four_points(points_world: Float[np.ndarray, "4 3"]) -> tuple[Box, float
     largest angle between an edge as drawn and as kept.
 
     Raises:
-        BadInput: a point is not finite, two consecutive points coincide, or the edges are nearly parallel.
+        BadInput: a point is not finite or beyond FARTHEST, two consecutive points coincide, or the edges are nearly
+            parallel.
     """
     p = np.asarray(points_world, dtype=np.float64)
     if p.shape != (4, 3) or not np.isfinite(p).all():
         raise BadInput(f"four points of three finite coordinates are needed, not {p.tolist()}")
+    if (np.abs(p) > FARTHEST).any():
+        raise BadInput(f"the points must be within {FARTHEST:g} m of the world's origin: {p.tolist()}")
     edge_z, edge_x, edge_y = p[1] - p[0], p[2] - p[1], p[3] - p[2]
     edges = np.column_stack([edge_x, edge_y, edge_z])
     lengths = np.linalg.norm(edges, axis=0)

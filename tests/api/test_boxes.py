@@ -70,6 +70,8 @@ BAD_BOXES: list[dict[str, Any]] = [
     {"T_world_box": {"position": [0, 0, 0], "wxyz": [1, 0, 0, 0], "scale": 2}},
     {"T_world_box": {"position": [0, 0, 0], "wxyz": [1e308, 1e308, 0, 0]}},
     {"T_world_box": [1, 0, 0, 0]},
+    {"T_world_box": {"position": [1e308, 0, 0], "wxyz": [1, 0, 0, 0]}},
+    {"T_world_box": {"position": [0, -2e7, 0], "wxyz": [1, 0, 0, 0]}},
 ]
 
 
@@ -176,6 +178,7 @@ def test_points_in_a_cameras_frame_are_moved_to_the_world(client: httpx.Client, 
         {"points": POINTS[:3]},
         {"points": [*POINTS[:3], POINTS[2]]},
         {"points": [[0, 0, z] for z in range(4)]},
+        {"points": [*POINTS[:3], [1e308, 0, 0]]},
         {"frame_of": "camera"},
         {"frame_of": "camera", "frame": 6},
         {"frame_of": "camera", "frame": -1},
