@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ars_web import arguments as take
+from ars_web import kernel_cache
 from ars_web.errors import ArsError, BadInput
 from ars_web.terminal import has_screen, note, open_browser, print_json, print_table, progress, write_json
 
@@ -371,6 +372,7 @@ def main() -> None:
     """Run the command line and end the process with its exit status."""
     # The small matrices here gain nothing from a BLAS with threads, and every worker of an export would start some.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    kernel_cache.find_place(os.environ, package=Path(__file__).parent)
     # Whoever ends it politely gets the same clean end as with Ctrl-C.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     sys.exit(run(sys.argv[1:]))
