@@ -1,45 +1,61 @@
 """From the scene to its arrays: pictures drawn and halved, light baked, shapes placed."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Float, Shaped, UInt8
 
 from ars_web.demo import desk_top, scene, shapes
 from ars_web.demo.light import bake_rows
 from ars_web.demo.pictures import PICTURES, Picture
 from ars_web.demo.scene import Thing
 from ars_web.demo.world import LEVEL_COUNT, PART, SURFACE, World
-from ars_web.geometry.rigid_transform import Transform
 
 DESK_TEXEL = 0.00056
 """Metres of the desk's top that one texel of its picture shows."""
-DESK_LIGHT_CELL = 0.003
+DESK_LIGHT_CELL = 0.004
 """Metres a cell of the grid of light on the desk's top, where the shadows are."""
+BAKED_ROWS = 20
+"""Rows of a grid of light that one job works out."""
 LIGHT_GRIDS = {shapes.BOX: (36, 36), shapes.BALL: (36, 72), shapes.CYLINDER: (32, 72), shapes.TUBE: (28, 72)}
 """Rows and columns of the grid of light on each surface of a kind of shape."""
 HANDLE_LIGHT_GRID = (16, 48)
 
 
+def place(things: Sequence[Thing], *, desk: Thing) -> Shaped[np.ndarray, "p"]:
+    """The shapes of the desk and of the things on it, as records of PART."""
+    records: list[tuple[object, ...]] = []
+    first_surface = 0
+    for owner, thing in [(-1, desk), *enumerate(things)]:
+        for part in thing.parts:
+            R, middle = thing.T_world_build[:3, :3], _middle_world(thing, part)
+            size = [*part.size, 0.0, 0.0][:3]
+            records.append((part.kind, size, R, middle, _reach(part.kind, part.size), owner, first_surface))
+            first_surface += len(part.looks)
+    return np.array(records, dtype=PART)
+
+
 def build_world(things: Sequence[Thing], *, desk: Thing, executor: Executor) -> World:
-    """The scene as arrays, with its pictures drawn and its light baked."""
-    owned = [(-1, desk, part) for part in desk.parts]
-    owned += [(i, thing, part) for i, thing in enumerate(things) for part in thing.parts]
-    parts = [part for _, _, part in owned]
-    looks = [look for part in parts for look in part.looks]
-    names = list(dict.fromkeys(name for name, _ in looks))
-    pyramids = [_pyramid(_draw(name, executor)) for name in names]
-    starts = np.cumsum([0] + [sum(len(level.reshape(-1, 3)) for level in pyramid) for pyramid in pyramids])
-    surfaces = np.zeros(len(looks), dtype=SURFACE)
+    """The scene as arrays, with its pictures drawn, and still in the dark."""
+    looks = [(part, i, *look) for thing in (desk, *things) for part in thing.parts for i, look in enumerate(part.looks)]
+    pyramids = {name: _pyramid(_draw(name, executor)) for name in dict.fromkeys(name for _, _, name, _ in looks)}
+    tables: dict[str, list[list[int]]] = {}
     texels = 0
-    placed = [(part, i, *look) for part in parts for i, look in enumerate(part.looks)]
-    for number, (part, surface, name, finish) in enumerate(placed):
-        pyramid = pyramids[names.index(name)]
+    for name, pyramid in pyramids.items():
+        tables[name] = []
+        for level in pyramid:
+            height, width, _ = level.shape
+            tables[name].append([texels, height, width])
+            texels += height * width
+    surfaces = np.zeros(len(looks), dtype=SURFACE)
+    cells = 0
+    for number, (part, surface, name, finish) in enumerate(looks):
+        pyramid = pyramids[name]
         rows, columns = _light_grid(part, name)
         surfaces[number] = (
-            _level_table(pyramid, int(starts[names.index(name)])),
+            tables[name],
             pyramid[0].shape[1] / _width(part, surface),
             _wraps(part.kind, surface),
             (pyramid[-1].reshape(-1, 3).mean(axis=0) / 255.0) ** 2,
@@ -47,51 +63,46 @@ def build_world(things: Sequence[Thing], *, desk: Thing, executor: Executor) -> 
             finish.gloss,
             finish.sharpness,
             finish.metal,
-            (texels, rows, columns),
+            (cells, rows, columns),
         )
-        texels += rows * columns
-    counts = [len(part.looks) for part in parts]
-    firsts = np.cumsum([0, *counts[:-1]])
-    records = np.zeros(len(parts), dtype=PART)
-    for i, (owner, thing, part) in enumerate(owned):
-        T = thing.T_world_build @ _shifted(part.middle)
-        size = [*part.size, 0.0, 0.0][:3]
-        records[i] = (part.kind, size, T[:3, :3], T[:3, 3], _reach(part.kind, part.size), owner, firsts[i])
-    world = World(
-        parts=records,
+        cells += rows * columns
+    return World(
+        parts=place(things, desk=desk),
         surfaces=surfaces,
-        texels=np.concatenate([level.reshape(-1, 3) for pyramid in pyramids for level in pyramid]),
-        lights=np.zeros((texels, 5)),
+        texels=np.concatenate([level.reshape(-1, 3) for pyramid in pyramids.values() for level in pyramid]),
+        lights=np.zeros((cells, 5)),
     )
-    jobs = []
-    for part, count in enumerate(counts):
-        for surface in range(count):
-            rows = int(surfaces["light_grid"][firsts[part] + surface, 1])
-            for first in range(0, rows, 20):
-                jobs.append(executor.submit(bake_rows, world, part, surface, first, min(first + 20, rows)))
+
+
+def lit_world(things: Sequence[Thing], *, desk: Thing, executor: Executor, meanwhile: Callable[[World], None]) -> World:
+    """The scene as arrays with the light worked out on every surface.
+
+    `meanwhile` is called with the world while the executor's threads are at it, once their code is compiled.
+    """
+    world = build_world(things, desk=desk, executor=executor)
+    bake_rows(world, 0, 0, 0, 0)  # compiled here, before many threads want it
+    jobs = [
+        executor.submit(bake_rows, world, index, surface, first, min(first + BAKED_ROWS, rows))
+        for index, part in enumerate(world.parts)
+        for surface in range(shapes.SURFACE_COUNTS[part["kind"]])
+        for rows in [int(world.surfaces["light_grid"][part["first_surface"] + surface, 1])]
+        for first in range(0, rows, BAKED_ROWS)
+    ]
+    meanwhile(world)
     for job in jobs:
         job.result()
     return world
 
 
-def _shifted(middle: tuple[float, float, float]) -> Transform:
-    T = np.eye(4)
-    T[:3, 3] = middle
-    return T
+def _middle_world(thing: Thing, part: scene.Part) -> Float[np.ndarray, "3"]:
+    return thing.T_world_build[:3, :3] @ np.array(part.middle) + thing.T_world_build[:3, 3]
 
 
 def _draw(name: str, executor: Executor) -> Picture | UInt8[np.ndarray, "h w 3"]:
     if name != "desk":
         return PICTURES[name]()
     half_x, half_y, _ = scene.DESK_HALF_SIZE
-    out = np.empty((round(2 * half_y / DESK_TEXEL), round(2 * half_x / DESK_TEXEL), 3), dtype=np.uint8)
-    rows = range(0, len(out), 128)
-    jobs = [
-        executor.submit(desk_top.draw_rows, out, first, min(first + 128, len(out)), half_x, half_y) for first in rows
-    ]
-    for job in jobs:
-        job.result()
-    return out
+    return desk_top.draw(half_x, half_y, texel=DESK_TEXEL, executor=executor)
 
 
 def _pyramid(picture: Picture | UInt8[np.ndarray, "h w 3"]) -> list[UInt8[np.ndarray, "h w 3"]]:
@@ -112,14 +123,6 @@ def _pyramid(picture: Picture | UInt8[np.ndarray, "h w 3"]) -> list[UInt8[np.nda
             level = ((total + 2) // 4).astype(np.uint8)
         out.append(level)
     return out
-
-
-def _level_table(pyramid: list[UInt8[np.ndarray, "h w 3"]], start: int) -> list[list[int]]:
-    table: list[list[int]] = []
-    for level in pyramid:
-        table.append([start, level.shape[0], level.shape[1]])
-        start += level.shape[0] * level.shape[1]
-    return table
 
 
 def _width(part: scene.Part, surface: int) -> float:

@@ -34,14 +34,13 @@ UP = _unit_vector(np.cross(INWARD, SIDE))
 """The window's axes: towards the desk's middle, and along its two sides."""
 DISTANCE2 = dot(WINDOW, WINDOW)
 
-FLOOR = -0.74
-ROOM = 3.2
-"""Height of the floor under the desk's top, and half the room's width."""
+FLOOR, RAIL, ROOM = -0.74, 0.12, 3.2
+"""Heights of the floor and of the rail on the walls, from the desk's top, and half the room's width."""
 
 
 @compiled
 def room(origin: Vector, direction: Vector) -> Vector:
-    """The colour of what lies behind everything, out of focus: a dark floor, light walls, the window's glow."""
+    """The colour of what lies behind everything, out of focus: a floor, and walls with a panel up to a rail."""
     t = MISS
     for axis in range(2):
         if abs(direction[axis]) > 1e-9:
@@ -50,15 +49,22 @@ def room(origin: Vector, direction: Vector) -> Vector:
     height = origin[2] + t * direction[2] if t < MISS else (-10.0 if direction[2] < 0 else 10.0)
     if height < FLOOR:
         x, y, _ = along(origin, direction, (FLOOR - origin[2]) / direction[2])
-        far = math.sqrt(x * x + y * y)
-        glow = 0.10 + 0.14 * math.exp(-((x + 1.6) ** 2 + (y - 1.1) ** 2) / 2.2)
-        under = 1 - 0.75 * math.exp(-(far * far) / 1.1)
-        return 1.02 * glow * under, 0.86 * glow * under, 0.72 * glow * under
+        glow = 0.16 + 0.20 * math.exp(-((x + 1.6) ** 2 + (y - 1.1) ** 2) / 2.2)
+        glow *= 1 - 0.75 * math.exp(-(x * x + y * y) / 1.1)  # the desk's shadow
+        return 1.06 * glow, 0.80 * glow, 0.62 * glow
     x, y, _ = along(origin, direction, t)
-    shade = 0.36 + 0.26 * math.exp(-((x + 2.6) ** 2 + (y - 1.8) ** 2) / 3.0)
-    skirting = min(max((height - FLOOR - 0.06) / 0.12, 0.0), 1.0)
-    shade *= (0.45 + 0.55 * skirting) * (0.9 + 0.1 * math.tanh(height))
-    return 1.06 * shade, 1.0 * shade, 0.92 * shade
+    shade = 0.80 + 0.55 * math.exp(-((x + 2.6) ** 2 + (y - 1.8) ** 2) / 3.0)
+    shade *= 0.35 + 0.65 * _soft_step(height, FLOOR + 0.12, 0.06)
+    rail = _soft_step(height, RAIL - 0.05, 0.03) - _soft_step(height, RAIL + 0.05, 0.03)
+    upper = _soft_step(height, RAIL, 0.05)
+    r, g, b = 0.46 + upper * (0.24 - 0.46), 0.44 + upper * (0.34 - 0.44), 0.40 + upper * (0.37 - 0.40)
+    return shade * (r + rail * (0.55 - r)), shade * (g + rail * (0.54 - g)), shade * (b + rail * (0.51 - b))
+
+
+@compiled
+def _soft_step(x: float, edge: float, soft: float) -> float:
+    """0 well below the edge, 1 well above."""
+    return min(max(0.5 + (x - edge) / (2 * soft), 0.0), 1.0)
 
 
 @compiled

@@ -1,5 +1,7 @@
 """Where the objects truly are in an image: their surfaces' points projected, and the pixels that see them."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
@@ -57,18 +59,29 @@ def amodal_box(
     return np.concatenate([np.nanmin(image, axis=0), np.nanmax(image, axis=0)])
 
 
-def pixel_counts(sight: Sight) -> tuple[Int[np.ndarray, "b"], Int[np.ndarray, "b"], Float[np.ndarray, "b 4"]]:
-    """Pixels in the image, pixels visible, and the box round the visible ones, of every object."""
-    count = len(sight.alone)
-    in_image = sight.alone.sum(axis=(1, 2))
-    boxes = np.full((count, 4), np.nan)
-    visible = np.zeros(count, dtype=np.int64)
-    for b in range(count):
-        seen = sight.objects == b
-        visible[b] = seen.sum()
-        if visible[b]:
-            boxes[b] = box_of_pixels(seen)
-    return in_image, visible, boxes
+@dataclass(frozen=True, eq=False)
+class Counts:
+    """Pixels of b objects in one image.
+
+    Attributes:
+        in_image: (b,) whose centre would see the object if there were nothing else.
+        visible: (b,) whose centre sees it.
+        bbox_visible: (b, 4) round those, image coordinates; NaN where there are none.
+    """
+
+    in_image: Int[np.ndarray, "b"]
+    visible: Int[np.ndarray, "b"]
+    bbox_visible: Float[np.ndarray, "b 4"]
+
+
+def pixel_counts(sight: Sight) -> Counts:
+    """How many pixels see each object, and where they are."""
+    seen = [sight.objects == b for b in range(len(sight.alone))]
+    return Counts(
+        in_image=np.array([np.count_nonzero(alone) for alone in sight.alone]),
+        visible=np.array([np.count_nonzero(mask) for mask in seen]),
+        bbox_visible=np.array([box_of_pixels(mask) if mask.any() else np.full(4, np.nan) for mask in seen]),
+    )
 
 
 def box_of_pixels(mask: Bool[np.ndarray, "h w"]) -> Float[np.ndarray, "4"]:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Generator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
@@ -15,6 +16,9 @@ from ars_web.demo.truth import TRUTH_FILE, DemoObject, DemoTruth, load_demo, loa
 from ars_web.errors import BadFile, BadInput, NotFound
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.camera import Camera
+
+if TYPE_CHECKING:
+    from ars_web.demo.world import World
 
 __all__ = ["DEMO_FRAMES", "DEMO_SIZE", "DemoObject", "DemoTruth", "load_demo", "make_demo"]
 
@@ -32,6 +36,7 @@ def make_demo(
     frames: int = DEMO_FRAMES,
     size: tuple[int, int] = DEMO_SIZE,
     progress: Callable[[int, int], None] | None = None,
+    world: "World | None" = None,
 ) -> DemoTruth:
     """The generated recording in `folder`, made there unless it is there already, whole and of this version.
 
@@ -43,6 +48,7 @@ def make_demo(
         frames: how many images the camera's way is cut into.
         size: the images' width and height; the lens is scaled with the width.
         progress: called with (images done, images in all) as they are written.
+        world: the scene as `lit_world` gives it, for who makes several; made where it is not given.
 
     Raises:
         BadInput: an argument that cannot be, or the folder holds something else.
@@ -59,7 +65,7 @@ def make_demo(
         with _only_one_at_a_time(folder):
             found = _found(folder, frames=frames, size=size)
             if found is None:
-                _make(folder, frames=frames, size=size, progress=progress)
+                _make(folder, frames=frames, size=size, progress=progress, world=world)
                 found = load_demo(folder)
     except OSError as error:
         raise BadFile(folder, f"the generated recording cannot be written: {error.strerror or error}") from error
@@ -97,7 +103,14 @@ def _is_whole(truth: DemoTruth) -> bool:
     )
 
 
-def _make(folder: Path, *, frames: int, size: tuple[int, int], progress: Callable[[int, int], None] | None) -> None:
+def _make(
+    folder: Path,
+    *,
+    frames: int,
+    size: tuple[int, int],
+    progress: Callable[[int, int], None] | None,
+    world: "World | None",
+) -> None:
     partial = folder.with_name(f".{folder.name}.partial")
     outdated = folder.with_name(f".{folder.name}.outdated")
     for leftover in (partial, outdated):
@@ -105,7 +118,7 @@ def _make(folder: Path, *, frames: int, size: tuple[int, int], progress: Callabl
             shutil.rmtree(leftover)
     try:
         (partial / "images").mkdir(parents=True)
-        _write(partial, frames=frames, size=size, progress=progress)
+        _write(partial, frames=frames, size=size, progress=progress, world=world)
         if folder.exists():
             folder.rename(outdated)
         partial.rename(folder)
@@ -114,7 +127,14 @@ def _make(folder: Path, *, frames: int, size: tuple[int, int], progress: Callabl
             shutil.rmtree(leftover, ignore_errors=True)
 
 
-def _write(folder: Path, *, frames: int, size: tuple[int, int], progress: Callable[[int, int], None] | None) -> None:
+def _write(
+    folder: Path,
+    *,
+    frames: int,
+    size: tuple[int, int],
+    progress: Callable[[int, int], None] | None,
+    world: "World | None",
+) -> None:
     # numba and OpenCV take a second to load and are of no use where the recording is there already.
     import cv2
 
@@ -125,18 +145,22 @@ def _write(folder: Path, *, frames: int, size: tuple[int, int], progress: Callab
     names = tuple(f"{i:05d}.jpg" for i in range(frames))
     executor = ThreadPoolExecutor(os.cpu_count())
     try:
-        world = building.build_world(things, desk=scene.desk(), executor=executor)
+        if world is None:
+            world = building.lit_world(
+                things, desk=scene.desk(), executor=executor, meanwhile=rendering.compile_kernels
+            )
+        lit = world
         rays = rendering.ray_table(camera)
         surfaces = [measuring.surface_points_world(thing) for thing in things]
 
-        def photograph(i: int) -> tuple[int, tuple[np.ndarray, np.ndarray, np.ndarray]]:
-            sight = rendering.look(world, rays, Ts_world_camera[i])
-            image = rendering.paint(world, rays, Ts_world_camera[i], sight, seed=i)
+        def photograph(i: int) -> tuple[int, measuring.Counts]:
+            sight = rendering.look(lit.parts, rays, Ts_world_camera[i])
+            image = rendering.paint(lit, rays, Ts_world_camera[i], sight, seed=i)
             _, jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
             return (folder / "images" / names[i]).write_bytes(jpeg.tobytes()), measuring.pixel_counts(sight)
 
         image_bytes: list[int] = []
-        counts: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+        counts: list[measuring.Counts] = []
         for written, counted in executor.map(photograph, range(frames)):
             image_bytes.append(written)
             counts.append(counted)
@@ -155,9 +179,9 @@ def _write(folder: Path, *, frames: int, size: tuple[int, int], progress: Callab
         bbox_amodal=np.array(
             [[measuring.amodal_box(camera, T, points) for points in surfaces] for T in Ts_world_camera]
         ),
-        bbox_visible=np.array([boxes for _, _, boxes in counts]),
-        px_in_image=np.array([in_image for in_image, _, _ in counts]),
-        px_visible=np.array([visible for _, visible, _ in counts]),
+        bbox_visible=np.array([count.bbox_visible for count in counts]),
+        px_in_image=np.array([count.in_image for count in counts]),
+        px_visible=np.array([count.visible for count in counts]),
     )
     T_wrist_camera = scene.T_WRIST_CAMERA
     _write_poses(folder / "robot_poses.txt", Ts_world_camera @ rigid_transform.invert(T_wrist_camera))

@@ -24,6 +24,12 @@ def ray_table(camera: Camera) -> Float[np.ndarray, "h w 2"]:
     return normalised_from_pixels(camera, np.stack([u, v], axis=-1))
 
 
+def compile_kernels(world: World) -> None:
+    """Compile what `look` and `paint` run, by a picture of no use: done while the light is baked."""
+    rays = np.zeros((2, 2, 2))
+    paint(world, rays, np.eye(4), look(world.parts, rays, np.eye(4)), seed=0)
+
+
 @dataclass(frozen=True, eq=False)
 class Sight:
     """What each pixel's centre sees.
@@ -41,10 +47,10 @@ class Sight:
     alone: Bool[np.ndarray, "b h w"]
 
 
-def look(world: World, rays: Float[np.ndarray, "h w 2"], T_world_camera: Transform) -> Sight:
-    """Cast a ray through every pixel's centre, at every object."""
+def look(parts: Shaped[np.ndarray, "p"], rays: Float[np.ndarray, "h w 2"], T_world_camera: Transform) -> Sight:
+    """Cast a ray through every pixel's centre, at every object; `parts` as building.place gives them."""
     shape = rays.shape[:2]
-    count = int(world.parts["owner"].max()) + 1
+    count = int(parts["owner"].max()) + 1
     sight = Sight(
         objects=np.empty(shape, dtype=np.int16),
         surfaces=np.empty(shape, dtype=np.int16),
@@ -52,7 +58,7 @@ def look(world: World, rays: Float[np.ndarray, "h w 2"], T_world_camera: Transfo
         alone=np.zeros((count, *shape), dtype=np.bool_),
     )
     _look(
-        world.parts,
+        parts,
         rays,
         np.ascontiguousarray(T_world_camera),
         sight.objects,
@@ -132,7 +138,7 @@ def _paint(
 ) -> None:
     height, width = surfaces.shape
     origin = (T[0, 3], T[1, 3], T[2, 3])
-    pixel = abs(rays[height // 2, width // 2 + 1, 0] - rays[height // 2, width // 2, 0])
+    pixel = abs(rays[height // 2, width // 2, 0] - rays[height // 2, width // 2 - 1, 0])
     for i in range(height):
         for j in range(width):
             rays_across = SUBPIXELS if _on_edge(surfaces, depths, i, j) else 1

@@ -152,14 +152,9 @@ def _mug(radius: float, height: float) -> tuple[Part, ...]:
     )
 
 
-def _can(radius: float, height: float, wrap: str, end: str) -> tuple[Part, ...]:
+def _can(radius: float, height: float, wrap: str, end: str, *, middle: float) -> tuple[Part, ...]:
     looks = ((wrap, PRINTED_TIN), (end, TIN), (end, TIN))
-    return (Part(shapes.CYLINDER, (radius, height / 2), (0.0, 0.0, height / 2), looks),)
-
-
-def _can_on_its_middle(radius: float, height: float, wrap: str, end: str) -> tuple[Part, ...]:
-    looks = ((wrap, PRINTED_TIN), (end, TIN), (end, TIN))
-    return (Part(shapes.CYLINDER, (radius, height / 2), (0.0, 0.0, 0.0), looks),)
+    return (Part(shapes.CYLINDER, (radius, height / 2), (0.0, 0.0, middle), looks),)
 
 
 def things() -> tuple[Thing, ...]:
@@ -174,11 +169,11 @@ def things() -> tuple[Thing, ...]:
         Thing("box", "die", _carton((0.021, 0.021, 0.021), die, LACQUER), _standing(0.195, -0.045, turn=23, z=0.029)),
         Thing("ball", "tennis ball", _ball(0.0335, "tennis", FELT), _rolled(0.055, -0.165, radius=0.0335, turn=40)),
         Thing("ball", "beach ball", _ball(0.058, "beach", LACQUER), _rolled(0.17, 0.165, radius=0.058, turn=115)),
-        Thing("can", "cola", _can(0.033, 0.115, "cola", "can end"), _standing(0.03, 0.02, turn=-75)),
+        Thing("can", "cola", _can(0.033, 0.115, "cola", "can end", middle=0.0575), _standing(0.03, 0.02, turn=-75)),
         Thing(
             "can",
             "tomatoes",
-            _can_on_its_middle(0.0375, 0.105, "tomato", "tin end"),
+            _can(0.0375, 0.105, "tomato", "tin end", middle=0.0),
             _lying(-0.105, -0.15, turn=38, roll=200, radius=0.0375),
         ),
         Thing("mug", "mug", _mug(0.041, 0.095), _standing(-0.185, -0.015, turn=215)),
@@ -220,7 +215,7 @@ def camera_path(frames: int) -> Float[np.ndarray, "n 4 4"]:
     """`Ts_world_camera` of a hand-held walk once round the desk, the same walk however many frames it is cut into.
 
     The height rises and falls, about half way the camera goes close, and at the end it turns to an empty corner
-    of the desk: the last frame, and with 60 the last two, have no object in view.
+    of the desk: the last frame, and with 60 the last three, have no object in view.
     """
     return np.array([_camera_at(i / max(frames - 1, 1)) for i in range(frames)])
 
@@ -229,10 +224,10 @@ def _camera_at(s: float) -> Transform:
     """The camera's pose at the share `s` of its way."""
     azimuth = math.radians(-38 + 372 * s)
     close = math.exp(-(((s - 0.56) / 0.055) ** 2))
-    elevation = math.radians(36 + 15 * math.sin(4 * math.pi * s + 1.1) - 9 * close)
-    distance = 0.70 + 0.08 * math.sin(6 * math.pi * s + 0.4) - 0.36 * close
+    elevation = math.radians(38 + 13 * math.sin(4 * math.pi * s + 1.1) - 9 * close)
+    distance = 0.66 + 0.12 * math.sin(6 * math.pi * s + 0.4) - 0.36 * close
     outward = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
-    target = np.array([0.035 * math.sin(9 * s), 0.03 * math.cos(7 * s), 0.045]) + 0.10 * close * outward
+    target = np.array([0.07 * math.sin(9 * s), 0.06 * math.cos(7 * s), 0.045]) + 0.10 * close * outward
     eye = target + distance * (math.cos(elevation) * outward + np.array([0.0, 0.0, math.sin(elevation)]))
     leave = float(np.clip((s - 0.915) / 0.055, 0, 1))
     leave = leave * leave * (3 - 2 * leave)
