@@ -20,9 +20,8 @@ RUN pip install -c constraints.txt setuptools \
     && pip uninstall -y setuptools pip
 
 FROM debian:bookworm-slim
-# libgomp1: numba's threads are only safe to call from several at once with it.
 RUN apt-get update \
-    && apt-get install -y --no-install-recommends python3 libgomp1 \
+    && apt-get install -y --no-install-recommends python3 \
     && rm -rf /var/lib/apt/lists/* \
     && useradd --uid 1000 --create-home ars \
     && install -d -o ars -g ars /sessions /var/cache/ars-web

@@ -303,6 +303,30 @@ def test_serve_prints_a_login_address_and_ends_with_ctrl_c(run: Commands) -> Non
     assert "Traceback" not in output.stderr
 
 
+def test_the_demo_is_made_once_and_exported_anew_when_its_session_changes(run: Commands, tmp_path: Path) -> None:
+    first = run("demo", "--no-browser").stdout
+    home = run.sessions / ".demo"
+    assert all(str(home / name) in first for name in ("yolo", "coco", "pictures"))
+    assert len(list((home / "pictures").glob("*.png"))) == 6
+    report = json.loads((home / "yolo" / "dataset.json").read_text())
+    assert sum(split["labels"] for split in report["splits"].values()) > 300
+
+    def times() -> dict[Path, int]:
+        return {path: path.stat().st_mtime_ns for path in home.rglob("[!.]*") if path.is_file()}
+
+    before = times()
+    assert run("demo", "--no-browser").stdout == first
+    assert times() == before
+
+    boxes = tmp_path / "boxes.json"
+    boxes.write_text(json.dumps([BOX]))
+    run("boxes", "import", "demo", boxes)
+    run("demo", "--no-browser")
+    changed = json.loads((home / "yolo" / "dataset.json").read_text())
+    assert (report["sessions"][0]["revision"], changed["sessions"][0]["revision"]) == (0, 1)
+    assert len(json.loads(run("list", "--json").stdout)) == 1
+
+
 def test_version_and_help_name_every_command(run: Commands) -> None:
     assert run("--version").stdout.startswith("ars-web ")
     top = run("--help").stdout
