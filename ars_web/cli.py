@@ -8,6 +8,7 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
+from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -373,6 +374,9 @@ def main() -> None:
     # The small matrices here gain nothing from a BLAS with threads, and every worker of an export would start some.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     kernel_cache.find_place(os.environ, package=Path(__file__).parent)
+    # A path that is not UTF-8 can be shown, if not kept: as backslashes and numbers.
+    if isinstance(sys.stdout, TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
     # Whoever ends it politely gets the same clean end as with Ctrl-C.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     sys.exit(run(sys.argv[1:]))
@@ -382,8 +386,14 @@ def run(arguments: Sequence[str]) -> int:
     """The exit status of one command line: 0 done, 2 wrong arguments, 130 stopped by Ctrl-C, 1 anything else."""
     try:
         status = app(list(arguments), prog_name="ars-web", standalone_mode=False)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # Whoever read the output has seen enough; what is left of it goes nowhere, also at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
     except typer.TyperException as error:
-        _fail(f"{error.format_message()} (see `ars-web --help`)")
+        command = getattr(getattr(error, "ctx", None), "command_path", "ars-web")
+        _fail(f"{error.format_message()} (see `{command} --help`)")
         return error.exit_code
     except ArsError as error:
         _fail(str(error))

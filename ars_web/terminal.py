@@ -40,7 +40,7 @@ def write_json(file: Path, value: object) -> None:
 
 def _json_value(value: object) -> str:
     if isinstance(value, Path):
-        return str(value)
+        return str(value).encode(errors="backslashreplace").decode()
     raise TypeError(f"{type(value).__name__} has no form in JSON")
 
 

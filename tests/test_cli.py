@@ -246,7 +246,9 @@ def test_wrong_arguments_end_with_2_and_one_line(
 ) -> None:
     run, session = shared
     given = [session if argument == "SESSION" else argument for argument in arguments]
-    assert named in one_line(run(*given, status=2))
+    line = one_line(run(*given, status=2))
+    assert named in line
+    assert line.endswith("--help`)")
 
 
 def test_what_is_wrong_with_the_input_ends_with_1_and_one_line(shared: tuple[Commands, str], tmp_path: Path) -> None:
@@ -260,6 +262,30 @@ def test_what_is_wrong_with_the_input_ends_with_1_and_one_line(shared: tuple[Com
     (tmp_path / "full" / "file").touch()
     assert "full" in one_line(run("export", session, "--format", "yolo", "--out", tmp_path / "full", status=1))
     assert "nowhere" in one_line(run("boxes", "export", session, tmp_path / "nowhere" / "boxes.json", status=1))
+
+
+def test_a_folder_whose_name_is_not_utf8_is_refused_in_one_line(run: Commands, recording: Path) -> None:
+    odd = recording.rename(recording.parent / os.fsdecode(b"desk\xff"))
+    assert "UTF-8" in run("import", odd, "--name", "desk", status=1).stderr
+    assert json.loads(run("list", "--json").stdout) == []
+
+
+def test_a_dataset_may_go_to_a_folder_whose_name_is_not_utf8(shared: tuple[Commands, str], tmp_path: Path) -> None:
+    run, session = shared
+    out = tmp_path / os.fsdecode(b"set\xff")
+    for arguments in ((), ("--json",)):
+        printed = run("export", session, "--format", "yolo", "--out", out / str(len(arguments)), *arguments).stdout
+        assert "udcff" in printed
+    assert (out / "0" / "data.yaml").is_file()
+
+
+def test_a_reader_of_the_output_may_leave_early(run: Commands) -> None:
+    with run.start("formats") as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.close()
+        assert process.stderr.read() == ""
+    assert process.returncode == 1
 
 
 def test_check_says_what_is_wrong_and_how_to_mend_it(run: Commands, session: str, tmp_path: Path) -> None:

@@ -63,7 +63,7 @@ def fill(
 
     Raises:
         BadInput: the recording has no frame, a frame's name is no relative path or not unique, its camera is not
-            listed, or its image cannot be copied.
+            listed, its image cannot be copied, or a path is not UTF-8.
         StoreError: the folder cannot be written.
     """
     _refuse_unsound(recording)
@@ -82,6 +82,10 @@ def fill(
                 copied=copy_images,
                 progress=None if copy_images else progress,
             )
+    except UnicodeEncodeError as error:
+        raise BadInput(
+            f"{error.object!r} is not text in UTF-8 and cannot be kept: rename the file or folder"
+        ) from error
     finally:
         database.close()
 
