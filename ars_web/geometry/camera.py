@@ -78,24 +78,31 @@ class Camera:
     def valid_radius(self) -> float:
         """Radius in the normalised plane up to which the distortion is one-to-one; tan(WIDEST_ANGLE) at most.
 
-        Brown: the smallest positive root of 1 + 3 k1 r^2 + 5 k2 r^4 + 7 k3 r^6, where the radial polynomial's
-        slope turns negative. Fisheye: likewise in the angle, 1 + 3 k1 t^2 + 5 k2 t^4 + 7 k3 t^6 + 9 k4 t^8.
+        Brown: the smallest positive root of 1 + 3 k1 r^2 + 5 k2 r^4 + 7 k3 r^6 - 6 |p| r, p = (p1, p2): where the
+        slope of the radial polynomial is too small for what the tangential terms may take off it. Up to there the
+        distortion's Jacobian, which is symmetric, is positive definite, and no two points meet. (1 + k1 r^2 + ...,
+        the stretch across, must hold out as well.) Fisheye: the slope likewise, in the angle,
+        1 + 3 k1 t^2 + 5 k2 t^4 + 7 k3 t^6 + 9 k4 t^8.
         """
         widest = math.tan(WIDEST_ANGLE)
         if self.model == "pinhole":
             return widest
         if self.model == "brown":
-            k1, k2, _, _, k3 = self.distortion
-            return min(_first_root([1.0, 3 * k1, 5 * k2, 7 * k3]), widest)
+            k1, k2, p1, p2, k3 = self.distortion
+            bent = -6 * math.hypot(p1, p2)
+            along = _first_root([1.0, bent, 3 * k1, 0.0, 5 * k2, 0.0, 7 * k3])
+            across = _first_root([1.0, bent, k1, 0.0, k2, 0.0, k3])
+            return min(along, across, widest)
         k1, k2, k3, k4 = self.distortion
-        return math.tan(min(_first_root([1.0, 3 * k1, 5 * k2, 7 * k3, 9 * k4]), WIDEST_ANGLE))
+        along = _first_root([1.0, 0.0, 3 * k1, 0.0, 5 * k2, 0.0, 7 * k3, 0.0, 9 * k4])
+        return math.tan(min(along, WIDEST_ANGLE))
 
 
 def _first_root(coefficients: list[float]) -> float:
-    """The smallest positive r with sum coefficients[i] r^(2 i) = 0, infinity where there is none."""
+    """The smallest r > 0 with sum coefficients[i] r^i = 0, infinity where there is none."""
     roots = np.polynomial.polynomial.polyroots(np.trim_zeros(coefficients, "b"))
     real = roots.real[(np.abs(roots.imag) < 1e-9 * np.maximum(1.0, np.abs(roots))) & (roots.real > 0)]
-    return math.sqrt(float(real.min())) if real.size else math.inf
+    return float(real.min()) if real.size else math.inf
 
 
 def image_from_pixels(pixels: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
@@ -186,7 +193,7 @@ def normalised_from_pixels(camera: Camera, pixels: Float[np.ndarray, "*n 2"]) ->
         step_x = (jacobian[..., 1, 1] * residual[..., 0] - jacobian[..., 0, 1] * residual[..., 1]) / det
         step_y = (jacobian[..., 0, 0] * residual[..., 1] - jacobian[..., 1, 0] * residual[..., 0]) / det
         out = out - np.clip(np.stack([step_x, step_y], axis=-1), -0.1, 0.1)
-        if np.nanmax(np.abs(residual), initial=0.0) < 1e-14:
+        if np.max(np.abs(residual), where=np.isfinite(residual), initial=0.0) < 1e-14:
             break
     bad = ~(np.abs(distorted_from_normalised(camera, out) - distorted).max(axis=-1) < 1e-9)
     out[bad] = np.nan
@@ -263,16 +270,21 @@ def rectified(camera: Camera) -> Camera:
 
     That is the largest axis-parallel rectangle within the undistorted border, each side at most
     WIDEST_RECTIFIED_ANGLE off the optical axis, its corners within the valid radius.
+
+    Raises:
+        BadInput: there is none, because the principal point is far outside the image.
     """
     if camera.model == "pinhole":
         return camera
-    border = normalised_from_pixels(camera, image_border_pixels(camera)).reshape(4, -1, 2)
+    sides = normalised_from_pixels(camera, image_border_pixels(camera, samples=256)).reshape(4, -1, 2)
+    # Each side with the corner at its end, which is the first point of the next.
+    top, right, bottom, left = (np.concatenate([sides[i], sides[(i + 1) % 4, :1]]) for i in range(4))
     widest = math.tan(WIDEST_RECTIFIED_ANGLE)
     # Where a side's ray does not exist, the image reaches beyond the widest angle there.
-    y0 = _innermost(border[0, :, 1], limit=-widest)
-    x1 = -_innermost(-border[1, :, 0], limit=-widest)
-    y1 = -_innermost(-border[2, :, 1], limit=-widest)
-    x0 = _innermost(border[3, :, 0], limit=-widest)
+    x0, y0 = _innermost(left[:, 0], limit=-widest), _innermost(top[:, 1], limit=-widest)
+    x1, y1 = -_innermost(-right[:, 0], limit=-widest), -_innermost(-bottom[:, 1], limit=-widest)
+    if not (x0 < x1 and y0 < y1):
+        raise BadInput(f"no rectified image can be cut out of this camera's: {camera}")
     corner = math.hypot(max(-x0, x1), max(-y0, y1))
     shrink = min(1.0, 0.999 * camera.valid_radius / corner)
     x0, x1, y0, y1 = (shrink * side for side in (x0, x1, y0, y1))

@@ -14,7 +14,7 @@ from numba import njit
 
 Array = np.ndarray
 
-LONGEST_CURVE = 1024
+LONGEST_CURVE = 4096
 """Points on one straight piece, however much it bends."""
 
 MOST_CHORDS = 24
@@ -23,11 +23,8 @@ MOST_CHORDS = 24
 LONGEST_QUARTER = 1024
 """Points on a quarter of the rim."""
 
-CAPACITY = 24_000
+CAPACITY = 80_000
 """Points of a ring: 16 pieces and five quarters, with room to spare."""
-
-FAR_TOLERANCE = 2e-5
-"""What is allowed in addition for each pixel that a curve is away from the image."""
 
 
 class Lens(NamedTuple):
@@ -144,6 +141,12 @@ def append_curve(
     return m + n
 
 
+@njit(error_model="numpy", forceinline=True)
+def far_tolerance(distance: float) -> float:
+    """What a curve may be off in addition where it is some pixels away from the image."""
+    return distance * min(2e-5 * (1.0 + 1e-4 * distance), 1e-3)
+
+
 @njit(error_model="numpy")
 def append_long_curve(
     lens: Lens, bends: Array, x0: float, y0: float, x1: float, y1: float, tolerance: float, points: Array, m: int
@@ -167,7 +170,8 @@ def append_long_curve(
         sagitta = bend * length2 * (s_end - s) ** 2 / 8.0
         away_u = max(min(u, u_end) - sagitta - lens.width, -max(u, u_end) - sagitta)
         away_v = max(min(v, v_end) - sagitta - lens.height, -max(v, v_end) - sagitta)
-        n = math.ceil(min(math.sqrt(sagitta / (tolerance + FAR_TOLERANCE * max(away_u, away_v, 0.0))), 1e6))
+        allowed = tolerance + far_tolerance(max(away_u, away_v, 0.0))
+        n = math.ceil(min(math.sqrt(sagitta / allowed), 1e6))
         if n > MOST_CHORDS and stretch > 2e-4:
             stretch *= 0.5
             continue
