@@ -29,7 +29,7 @@ from ars_web.datasets.assembly import assemble, finished_shards, is_published, p
 from ars_web.datasets.plan import ExportPlan, plan_export, usable_out
 from ars_web.datasets.plan_files import digest_of, read_digest, write_plan
 from ars_web.datasets.report import ExportReport
-from ars_web.datasets.worker import CANCEL, export_shard, start_worker, unfinished_folder
+from ars_web.datasets.worker import CANCEL, begun_folders, export_shard, start_worker
 from ars_web.errors import ArsError, BadInput, Cancelled, StoreError
 
 __all__ = ["partial_folder", "plan_export", "run_export"]
@@ -175,13 +175,14 @@ def _run_shards(
     idle_deaths = 0
     while missing := sorted(set(range(len(plan.shards))) - set(finished_shards(plan, partial))):
         for number in missing:
-            shutil.rmtree(unfinished_folder(partial, number), ignore_errors=True)
+            for folder in begun_folders(partial, number):
+                shutil.rmtree(folder, ignore_errors=True)
         (partial / CANCEL).unlink(missing_ok=True)
         batch = [number for number in missing if not deaths[number]] or missing[:1]
         try:
             _run_batch(plan, partial, batch, make, on_progress, cancelled)
         except BrokenExecutor as error:
-            begun = [number for number in batch if unfinished_folder(partial, number).exists()]
+            begun = [number for number in batch if begun_folders(partial, number)]
             _log.warning("a worker was killed; shards %s are run again", begun or batch)
             deaths.update(begun)
             idle_deaths = 0 if begun else idle_deaths + 1

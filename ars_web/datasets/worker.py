@@ -1,7 +1,6 @@
 """One shard of an export, done from the partial folder alone: what a worker process runs."""
 
 import os
-import shutil
 import signal
 import threading
 import time
@@ -9,6 +8,7 @@ from collections.abc import Callable
 from functools import lru_cache
 from multiprocessing import connection, parent_process
 from pathlib import Path
+from tempfile import mkdtemp
 
 import numpy as np
 from jaxtyping import Int
@@ -58,9 +58,17 @@ def shard_folder(partial: Path, number: int) -> Path:
     return partial / "shards" / f"{number:05d}"
 
 
-def unfinished_folder(partial: Path, number: int) -> Path:
-    """Where a shard lies while it is written."""
-    return partial / "shards" / f"{number:05d}.tmp"
+def new_folder(partial: Path, number: int) -> Path:
+    """A folder of its own for one try at a shard: whoever renames it has written all of it.
+
+    With one name for all tries, a worker that was thought dead could give a later worker's half the shard's name.
+    """
+    return Path(mkdtemp(dir=partial / "shards", prefix=f"{number:05d}.", suffix=".tmp"))
+
+
+def begun_folders(partial: Path, number: int) -> list[Path]:
+    """The folders of tries at a shard that have not ended well."""
+    return list((partial / "shards").glob(f"{number:05d}.*.tmp"))
 
 
 def export_shard(partial: str, number: int, digest: str) -> int:
@@ -76,10 +84,9 @@ def export_shard(partial: str, number: int, digest: str) -> int:
     plan, folder = _plan(partial, digest), Path(partial)
     check = _watch(folder / CANCEL)
     check()
-    tmp = unfinished_folder(folder, number)
-    shutil.rmtree(tmp, ignore_errors=True)
+    tmp = new_folder(folder, number)
     for name in ("files", "fragments"):
-        (tmp / name).mkdir(parents=True)
+        (tmp / name).mkdir()
     shard, dropped = _shard(plan, number)
     check()
     if plan.options.images != "none":
@@ -88,7 +95,10 @@ def export_shard(partial: str, number: int, digest: str) -> int:
     report = ShardReport(splits=_counts(shard), dropped=dropped, digests=digests)
     (tmp / "shard.json").write_text(report.model_dump_json(), encoding="utf-8")
     check()
-    tmp.rename(shard_folder(folder, number))
+    whole = shard_folder(folder, number)
+    # A try that was given up may have ended well after all. Its bytes are the same.
+    if not whole.is_dir():
+        tmp.rename(whole)
     return len(shard.stems)
 
 

@@ -19,9 +19,16 @@ from ars_web.sessions.store import SessionStore
 
 OPTIONS = ExportOptions.model_validate({"images": "rectify"})
 
+
+def in_place(partial: Path, number: int) -> Path:
+    folder = worker.shard_folder(partial, number)
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
 # Workers are spawned, and import this file too: the faults reach them by the arguments that they inherit.
 if "--in-place" in sys.argv:
-    worker.unfinished_folder = worker.shard_folder
+    worker.new_folder = in_place
 if "--no-watch" in sys.argv:
     worker._exit_after = lambda sentinel: None
 if "--once" in sys.argv:
