@@ -1,6 +1,10 @@
 """What every test stands on: shapes checked at run time, and the recorded data where it is present."""
 
 import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -36,6 +40,27 @@ def demo_recording(tmp_path_factory: pytest.TempPathFactory):
     if "PYTEST_XDIST_WORKER" in os.environ:
         root = root.parent  # shared by the workers; make_demo lets one of them make it
     return make_demo(root / "demo-recording", frames=9, size=(480, 360))
+
+
+@contextmanager
+def _served(sessions: Path, *options: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    command = [sys.executable, "-m", "ars_web", "serve", "--sessions", str(sessions), "--port", "0", *options]
+    # The ars_web beside this file, whether or not one is installed.
+    search = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=search)
+    try:
+        said = [process.stdout.readline() for _ in range(2)]
+        assert "/login?code=" in said[-1], "".join(said) + process.stderr.read()
+        yield process, said[-1].split()[-1]
+    finally:
+        process.kill()
+        process.communicate()
+
+
+@pytest.fixture(scope="session")
+def served():
+    """`with served(sessions, *options) as (process, login_url)`: a server process on a free port, killed at the end."""
+    return _served
 
 
 def pytest_report_header() -> str:

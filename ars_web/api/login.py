@@ -23,6 +23,11 @@ def router(static: Path) -> APIRouter:
         known = request.scope["state"]["author"] is not None
         return FileResponse(static / ("index.html" if known else "login.html"), headers={"Cache-Control": "no-store"})
 
+    @routes.get("/favicon.ico", include_in_schema=False)
+    def icon() -> FileResponse:
+        """What browsers ask for by themselves where they show JSON."""
+        return FileResponse(static / "icon.svg")
+
     @routes.get("/login", include_in_schema=False)
     def by_code(request: Request, services: ServicesDep, code: Annotated[str, Query(max_length=200)] = "") -> Response:
         """Trade a one-time code for the cookie, and go on to the page."""

@@ -24,7 +24,7 @@ SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 
 LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
 
-OPEN_PATHS = frozenset({"/", "/login", "/api/health"})
+OPEN_PATHS = frozenset({"/", "/login", "/favicon.ico", "/api/health"})
 """What is answered without a login; beside them only files of the page, below OPEN_FOLDER. None holds data."""
 
 OPEN_FOLDER = "/static/"
