@@ -110,8 +110,12 @@ def truncation(
     grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     grid = grid[rays_meet(grid, T_world_camera, box, near=near)]
     h = 1e-6 * camera.valid_radius
-    across = cameras.pixels_from_normalised(camera, grid + [h, 0.0]) - cameras.pixels_from_normalised(camera, grid)
-    down = cameras.pixels_from_normalised(camera, grid + [0.0, h]) - cameras.pixels_from_normalised(camera, grid)
+    across = cameras.pixels_from_normalised(camera, grid + np.array([h, 0.0])) - cameras.pixels_from_normalised(
+        camera, grid
+    )
+    down = cameras.pixels_from_normalised(camera, grid + np.array([0.0, h])) - cameras.pixels_from_normalised(
+        camera, grid
+    )
     area = np.nan_to_num(across[:, 0] * down[:, 1] - across[:, 1] * down[:, 0])
     inside = cameras.in_image(camera, cameras.pixels_from_normalised(camera, grid))
     return float(1 - area[inside].sum() / area.sum())
