@@ -39,7 +39,8 @@ def place(things: Sequence[Thing], *, desk: Thing) -> Shaped[np.ndarray, "p"]:
 
 def build_world(things: Sequence[Thing], *, desk: Thing, executor: Executor) -> World:
     """The scene as arrays, with its pictures drawn, and still in the dark."""
-    looks = [(part, i, *look) for thing in (desk, *things) for part in thing.parts for i, look in enumerate(part.looks)]
+    parts = [part for thing in (desk, *things) for part in thing.parts]
+    looks = [(number, i, *look) for number, part in enumerate(parts) for i, look in enumerate(part.looks)]
     pyramids = {name: _pyramid(_draw(name, executor)) for name in dict.fromkeys(name for _, _, name, _ in looks)}
     tables: dict[str, list[list[int]]] = {}
     texels = 0
@@ -51,13 +52,14 @@ def build_world(things: Sequence[Thing], *, desk: Thing, executor: Executor) -> 
             texels += height * width
     surfaces = np.zeros(len(looks), dtype=SURFACE)
     cells = 0
-    for number, (part, surface, name, finish) in enumerate(looks):
-        pyramid = pyramids[name]
+    for surface, (number, own_number, name, finish) in enumerate(looks):
+        part, pyramid = parts[number], pyramids[name]
         rows, columns = _light_grid(part, name)
-        surfaces[number] = (
+        surfaces[surface] = (
+            number,
             tables[name],
-            pyramid[0].shape[1] / _width(part, surface),
-            _wraps(part.kind, surface),
+            pyramid[0].shape[1] / _width(part, own_number),
+            _wraps(part.kind, own_number),
             (pyramid[-1].reshape(-1, 3).mean(axis=0) / 255.0) ** 2,
             finish.mirror,
             finish.gloss,

@@ -165,12 +165,12 @@ def _light_all_round(
                 x * across[1] + y * third[1] + cosine * normal[1],
                 x * across[2] + y * third[2] + cosine * normal[2],
             )
-            t, part, surface = trace(parts, origin, direction)
-            if part < 0:
+            t, surface = trace(parts, origin, direction)
+            if surface < 0:
                 red, green, blue = _sky(direction)
             else:
                 # Where the ray met something near, that place is dark too.
-                lit = 0.85 * t / (t + 0.035) if parts[part].owner < 0 else 0.45 * t / (t + 0.012)
+                lit = 0.85 * t / (t + 0.035) if parts[int(surfaces[surface].part)].owner < 0 else 0.45 * t / (t + 0.012)
                 mean = surfaces[surface].mean
                 red, green, blue = lit * mean[0], lit * mean[1], lit * mean[2]
             r, g, b = r + red, g + green, b + blue

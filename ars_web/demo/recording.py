@@ -145,12 +145,11 @@ def _write(
     names = tuple(f"{i:05d}.jpg" for i in range(frames))
     executor = ThreadPoolExecutor(os.cpu_count())
     try:
-        if world is None:
-            world = building.lit_world(
-                things, desk=scene.desk(), executor=executor, meanwhile=rendering.compile_kernels
-            )
-        lit = world
-        rays = rendering.ray_table(camera)
+        ray_table = executor.submit(rendering.ray_table, camera)
+        lit = world or building.lit_world(
+            things, desk=scene.desk(), executor=executor, meanwhile=rendering.compile_kernels
+        )
+        rays = ray_table.result()
         surfaces = [measuring.surface_points_world(thing) for thing in things]
 
         def photograph(i: int) -> tuple[int, measuring.Counts]:

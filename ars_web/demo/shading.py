@@ -6,7 +6,7 @@ Colours are linear red, green, blue.
 import math
 
 import numpy as np
-from jaxtyping import Float, Shaped, UInt8
+from jaxtyping import Float, UInt8
 
 from ars_web.demo.compiled import compiled
 from ars_web.demo.light import WINDOW, WINDOW_LIGHT, room, window_in_mirror
@@ -122,9 +122,7 @@ def colour_along(world: World, origin: Vector, direction: Vector, t: float, surf
     walked, seen = 0.0, 1.0
     for bounce in range(2):
         if surface == UNKNOWN:
-            t, index, surface = trace(world.parts, origin, direction)
-        else:
-            index = _part_of(world.parts, surface)
+            t, surface = trace(world.parts, origin, direction)
         if surface < 0:
             red, green, blue = room(origin, direction)
             if bounce > 0:
@@ -132,7 +130,8 @@ def colour_along(world: World, origin: Vector, direction: Vector, t: float, surf
                 red, green, blue = red + glow, green + glow, blue + glow
             r, g, b = r + keep[0] * red, g + keep[1] * green, b + keep[2] * blue
             break
-        part, look = world.parts[index], world.surfaces[surface]
+        look = world.surfaces[surface]
+        part = world.parts[int(look.part)]
         point = along(origin, direction, t)
         # What a curved mirror shows is squeezed: its picture is read four times as coarse.
         walked += t if bounce == 0 else 4 * t
@@ -152,14 +151,6 @@ def colour_along(world: World, origin: Vector, direction: Vector, t: float, surf
         origin, direction = along(point, normal, 1e-4), along(direction, normal, 2 * facing)
         surface = UNKNOWN
     return r, g, b
-
-
-@compiled
-def _part_of(parts: Shaped[np.ndarray, "p"], surface: int) -> int:
-    index = len(parts) - 1
-    while index > 0 and parts[index].first_surface > surface:
-        index -= 1
-    return index
 
 
 @compiled

@@ -42,6 +42,7 @@ LEVEL_COUNT = 12
 
 SURFACE = np.dtype(
     [
+        ("part", np.int64),
         ("levels", np.int64, (LEVEL_COUNT, 3)),
         ("density", np.float64),
         ("wraps", np.bool_),
@@ -54,7 +55,7 @@ SURFACE = np.dtype(
     ],
     align=True,
 )
-"""A surface of a part: first texel, height and width of each level of its picture; texels a metre at level 0;
+"""A surface: number of its part; first texel, height and width of each level of its picture; texels a metre at level 0;
 whether u = 0 and u = 1 are the same place; mean linear colour; its finish, as scene.Finish; first row in `lights`,
 height and width of its grid of light."""
 
@@ -62,6 +63,7 @@ height and width of its grid of light."""
 class SurfaceRecord(Protocol):
     """One of SURFACE, for the type checker."""
 
+    part: int
     levels: Int[np.ndarray, "l 3"]
     density: float
     wraps: bool
@@ -145,14 +147,14 @@ def enter_part(part: PartRecord, origin: Vector, direction: Vector) -> tuple[flo
 
 
 @compiled
-def trace(parts: Shaped[np.ndarray, "p"], origin: Vector, direction: Vector) -> tuple[float, int, int]:
-    """The nearest hit of a ray: distance (MISS for none), part, surface."""
-    nearest, hit_part, hit_surface = MISS, -1, -1
+def trace(parts: Shaped[np.ndarray, "p"], origin: Vector, direction: Vector) -> tuple[float, int]:
+    """The nearest hit of a ray: distance and number of the surface; MISS and -1 for none."""
+    nearest, hit = MISS, -1
     for i in range(len(parts)):
         t, surface = enter_part(parts[i], origin, direction)
         if t < nearest:
-            nearest, hit_part, hit_surface = t, i, surface
-    return nearest, hit_part, hit_surface
+            nearest, hit = t, surface
+    return nearest, hit
 
 
 @compiled
