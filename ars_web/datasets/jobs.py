@@ -191,7 +191,8 @@ def _run_shards(
                     raise ArsError(_given_up(plan, number)) from error
             if idle_deaths >= MOST_DEATHS:
                 raise ArsError(
-                    f"workers were killed {MOST_DEATHS} times before they began a shard; is memory short?"
+                    f"workers were killed {MOST_DEATHS} times before they began a shard; is memory short, or does the"
+                    " script that exports lack its `if __name__ == '__main__':`?"
                 ) from error
 
 

@@ -276,9 +276,12 @@ def test_a_worker_looks_for_the_cancel_mark_within_its_shard(make_snapshot: Make
 
 
 @pytest.mark.parametrize("images", ["link", "copy", "rectify"])
-@pytest.mark.parametrize("damage", ["removed", "replaced", "cut"])
+@pytest.mark.parametrize(
+    ("damage", "says"),
+    [("removed", "cannot be exported"), ("replaced", "changed since"), ("cut", "changed since")],
+)
 def test_an_image_that_changed_after_planning_fails_the_export(
-    make_snapshot: Make, tmp_path: Path, damage: str, images: str
+    make_snapshot: Make, tmp_path: Path, damage: str, says: str, images: str
 ) -> None:
     snapshot = make_snapshot(6)
     plan = plan_of(snapshot, out=tmp_path / "d", shard=2, images=images)
@@ -286,10 +289,10 @@ def test_an_image_that_changed_after_planning_fails_the_export(
     if damage == "removed":
         image.unlink()
     elif damage == "replaced":
-        image.write_bytes(snapshot.frames.images[4].read_bytes())
+        image.write_bytes(snapshot.frames.images[2].read_bytes())
     else:
         image.write_bytes(image.read_bytes()[:-40])
-    with pytest.raises(BadFile, match=r"0003\.jpg: the image"):
+    with pytest.raises(BadFile, match=rf"0003\.jpg: the image {says}"):
         run_export(plan, executor_factory=two_processes if images == "rectify" else one_thread)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["recording-s1"]
 
