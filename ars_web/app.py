@@ -1,5 +1,6 @@
 """The one place where the API, the page, the store and the export jobs are joined, opened and closed."""
 
+import gc
 import importlib
 import ipaddress
 import logging
@@ -148,7 +149,7 @@ def serve(settings: Settings, *, on_ready: Callable[[str], None] | None = None) 
         StoreError: the sessions folder or its token cannot be used.
     """
     token = sessions_token(settings)
-    with _listening(settings) as listener:
+    with listening(settings.host, settings.port) as listener:
         port = listener.getsockname()[1]
         settings = settings.model_copy(update={"token": token, "port": port})
         app = create_app(settings)
@@ -169,6 +170,8 @@ def serve(settings: Settings, *, on_ready: Callable[[str], None] | None = None) 
             if on_ready is not None:
                 on_ready(url)
 
+        # What the imports made stays to the end: the collector need not look through it again and again.
+        gc.freeze()
         # uvicorn raises the signal that stopped it once more, when all is closed.
         with suppress(KeyboardInterrupt):
             _Server(config, app, ready).run(sockets=[listener])
@@ -192,14 +195,24 @@ class _Server(uvicorn.Server):
         await super().shutdown(sockets)
 
 
-def _listening(settings: Settings) -> socket.socket:
-    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
+def listening(host: str, port: int) -> socket.socket:
+    """A socket that listens on `host`; port 0 takes a free one.
+
+    Raises:
+        BadInput: the address cannot be had.
+    """
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    # asyncio turns off Nagle's algorithm only on sockets that say they are TCP; otherwise each small answer waits for
+    # the client's delayed acknowledgement, 40 ms.
+    listener = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     try:
-        return socket.create_server((settings.host, settings.port), family=family, backlog=2048)
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind((host, port))
+        listener.listen(2048)
     except OSError as error:
-        raise BadInput(
-            f"cannot listen on {settings.host}:{settings.port}: {error.strerror}; choose another host or port"
-        ) from error
+        listener.close()
+        raise BadInput(f"cannot listen on {host}:{port}: {error.strerror}; choose another host or port") from error
+    return listener
 
 
 def _shown_host(host: str) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from ars_web.app import create_app, executor_factory, serve, sessions_token, static_folder
+from ars_web.app import create_app, executor_factory, listening, serve, sessions_token, static_folder
 from ars_web.errors import BadInput, StoreError
 from ars_web.settings import Settings
 
@@ -63,6 +63,14 @@ def test_a_port_in_use_is_said_so(tmp_path: Path) -> None:
         port = taken.getsockname()[1]
         with pytest.raises(BadInput, match=rf"127\.0\.0\.1:{port}"):
             serve(Settings(sessions=tmp_path, port=port))
+
+
+def test_small_answers_are_sent_at_once() -> None:
+    """asyncio turns Nagle's algorithm off on accepted sockets only where the listening one says it is TCP."""
+    with listening("127.0.0.1", 0) as listener, socket.create_connection(listener.getsockname()):
+        accepted, _ = listener.accept()
+        with accepted:
+            assert accepted.proto == socket.IPPROTO_TCP
 
 
 def test_a_token_that_others_can_read_stops_the_server(tmp_path: Path) -> None:

@@ -1,6 +1,5 @@
 """A real server on a free port of this machine, in a thread, with a small recording to import."""
 
-import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -17,7 +16,7 @@ import uvicorn
 from fastapi import FastAPI
 
 from ars_web.api.dependencies import Services
-from ars_web.app import create_app
+from ars_web.app import create_app, listening
 from ars_web.settings import Settings
 
 TOKEN = "a-token-for-tests"
@@ -83,7 +82,7 @@ def run_server(folder: Path, **settings: Any) -> Iterator[Server]:
     root = folder / "root"
     if not root.exists():
         write_scene(root / "scene")
-    listener = socket.create_server(("127.0.0.1", 0))
+    listener = listening("127.0.0.1", 0)
     port = listener.getsockname()[1]
     app = create_app(
         Settings(

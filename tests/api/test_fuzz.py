@@ -51,7 +51,7 @@ BODIES: dict[str, st.SearchStrategy[Any]] = {
 requests = st.sampled_from(sorted(BODIES)).flatmap(lambda name: st.tuples(st.just(name), BODIES[name]))
 
 
-@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(request=requests, tag=st.sampled_from(["current", '"0"', '"x"', "nonsense", ""]))
 def test_no_request_makes_the_server_fail(server, sid: str, request: tuple[str, Any], tag: str) -> None:
     name, body = request
@@ -71,7 +71,7 @@ def test_no_request_makes_the_server_fail(server, sid: str, request: tuple[str, 
     assert labels.status_code == 200, labels.text
 
 
-@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(body=shaped(name=texts, root=st.just("data"), path=texts, format=texts, classes=st.lists(texts)))
 def test_no_import_makes_the_server_fail(server, body: Any) -> None:
     content = json.dumps(body).encode(errors="surrogatepass")
