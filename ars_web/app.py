@@ -173,8 +173,13 @@ def serve(settings: Settings, *, on_ready: Callable[[str], None] | None = None) 
         # What the imports made stays to the end: the collector need not look through it again and again.
         gc.freeze()
         # uvicorn raises the signal that stopped it once more, when all is closed.
-        with suppress(KeyboardInterrupt):
-            _Server(config, app, ready).run(sockets=[listener])
+        try:
+            with suppress(KeyboardInterrupt):
+                _Server(config, app, ready).run(sockets=[listener])
+        finally:
+            # Whoever interrupts a second time does not wait for the lifespan's end; an export must not keep it up.
+            if hasattr(app.state, "services"):
+                app.state.services.exports.close()
 
 
 class _Server(uvicorn.Server):

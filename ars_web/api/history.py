@@ -54,4 +54,8 @@ async def events(
     """Server-Sent Events: every edit after a revision, those of the past first; without one, from now on."""
     await run_in_threadpool(services.store.revision, sid)  # an unknown session is answered before the stream begins
     start = after if last_event_id is None else last_event_id
-    return StreamingResponse(services.events.stream(sid, after=start), media_type="text/event-stream")
+    return StreamingResponse(
+        services.events.stream(sid, after=start),
+        media_type="text/event-stream",
+        headers={"X-Accel-Buffering": "no"},  # proxies that gather what they pass on would hold events back
+    )

@@ -40,8 +40,10 @@ class MultipartForm:
         self._part = ""
         self._target: IO[bytes] | None = None
 
-    async def receive(self, content_type: str, pieces: AsyncIterable[bytes], *, most: int) -> None:
-        """Take the form in.
+    async def receive(
+        self, content_type: str, pieces: AsyncIterable[bytes], *, declared: str | None, most: int
+    ) -> None:
+        """Take the form in; `declared` is its Content-Length.
 
         Raises:
             TooLarge: it is over `most` bytes, whatever its headers say.
@@ -52,13 +54,16 @@ class MultipartForm:
         boundary = options.get(b"boundary")
         if kind != b"multipart/form-data" or not boundary:
             raise BadInput(f"a multipart/form-data request is needed, with `file`, {', '.join(self._known)}")
+        too_large = TooLarge(f"the upload is over {most} bytes; import the recording from a declared root instead")
+        if declared is not None and declared.isdigit() and int(declared) > most:
+            raise too_large
         received = 0
         try:
             parser = MultipartParser(boundary, self._callbacks())  # pyright: ignore[reportArgumentType]: plain callables
             async for piece in pieces:
                 received += len(piece)
                 if received > most:
-                    raise TooLarge(f"the upload is over {most} bytes; import it from a declared root instead")
+                    raise too_large
                 await run_in_threadpool(parser.write, piece)
         except FormParserError as error:
             raise BadInput(f"the form cannot be read: {error}") from error

@@ -80,6 +80,8 @@ def picture(request: PictureRequest) -> tuple[bytes, str]:
     if width is None and not request.rectified and header.orientation == 1:
         data = request.path.read_bytes()
         return data, "image/png" if data.startswith(b"\x89PNG") else "image/jpeg"
+    if not header.whole:
+        raise BadFile(request.path, "the image ends before its data does (truncated)")
     if request.rectified:
         image = rectify(read_image(request.path), request.camera)
     elif width is None:
@@ -98,8 +100,11 @@ def _reduced(path: Path, *, stored_width: int, width: int) -> UInt8[np.ndarray, 
     factor = next((factor for factor in (8, 4, 2) if stored_width >= factor * width), None)
     if factor is None:
         return read_image(path)
-    data = np.fromfile(path, dtype=np.uint8)
-    image = cv2.imdecode(data, _REDUCED[factor] | cv2.IMREAD_IGNORE_ORIENTATION)
+    try:
+        data = np.fromfile(path, dtype=np.uint8)
+        image = cv2.imdecode(data, _REDUCED[factor] | cv2.IMREAD_IGNORE_ORIENTATION)
+    except (OSError, cv2.error) as error:
+        raise BadFile(path, f"the image cannot be decoded: {error}") from error
     if image is None:
         raise BadFile(path, "the image cannot be decoded (damaged)")
     return image

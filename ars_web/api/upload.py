@@ -62,7 +62,12 @@ async def upload(request: Request, response: Response, services: ServicesDep, ke
     try:
         folder = await run_in_threadpool(things.enter_context, unseen_folder(services.store.folder))
         form = MultipartForm(folder / "upload.zip", known=UploadFields.model_fields)
-        await form.receive(request.headers.get("content-type", ""), request.stream(), most=services.largest_upload)
+        await form.receive(
+            request.headers.get("content-type", ""),
+            request.stream(),
+            declared=request.headers.get("content-length"),
+            most=services.largest_upload,
+        )
         made = await run_in_threadpool(_import, form, folder / "recording", services, key)
     finally:
         await run_in_threadpool(things.close)  # it takes away a folder that may be large

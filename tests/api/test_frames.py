@@ -182,7 +182,8 @@ def test_an_image_that_is_gone_or_spoiled_is_said_so(client: httpx.Client, swapp
         assert answer.headers["content-type"] == "application/problem+json"
     whole = (images / "00002.jpg").read_bytes()
     (images / "00002.jpg").write_bytes(whole[: len(whole) // 2])
-    assert client.get(f"{path}/2/image?rectified=1").status_code == 422
+    for query in ("?width=80", "?width=20", "?rectified=1"):
+        assert client.get(f"{path}/2/image{query}").status_code == 422
 
 
 def test_labels_of_a_frame(client: httpx.Client, sid: str, box_json: dict[str, Any]) -> None:
