@@ -30,7 +30,7 @@ def place(things: Sequence[Thing], *, desk: Thing) -> Shaped[np.ndarray, "p"]:
     first_surface = 0
     for owner, thing in [(-1, desk), *enumerate(things)]:
         for part in thing.parts:
-            R, middle = thing.T_world_build[:3, :3], _middle_world(thing, part)
+            R, middle = thing.T_world_build[:3, :3] @ part.rolled, _middle_world(thing, part)
             size = [*part.size, 0.0, 0.0][:3]
             records.append((part.kind, size, R, middle, _reach(part.kind, part.size), owner, first_surface))
             first_surface += len(part.looks)

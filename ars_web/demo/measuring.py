@@ -45,7 +45,7 @@ def _points(part: Part) -> Float[np.ndarray, "n 3"]:
     )
     if part.kind == shapes.HANDLE:
         points = points[points[:, 0] >= part.size[2]]
-    return points + part.middle
+    return points @ part.rolled.T + part.middle
 
 
 def amodal_box(

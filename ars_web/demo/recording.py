@@ -26,7 +26,7 @@ DEMO_FRAMES = 60
 DEMO_SIZE = (960, 720)
 JPEG_QUALITY = 92
 
-VERSION = 1
+VERSION = 2
 """Goes up whenever other images or another truth would be written: what was made before is then made again."""
 
 

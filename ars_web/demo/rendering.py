@@ -9,8 +9,8 @@ from jaxtyping import Bool, Float, Int16, Shaped, UInt8
 from ars_web.demo import noise
 from ars_web.demo.compiled import compiled
 from ars_web.demo.shading import UNKNOWN, colour_along
-from ars_web.demo.shapes import MISS, Vector, unit
-from ars_web.demo.world import World, enter_part
+from ars_web.demo.shapes import MISS, Vector, dot, unit
+from ars_web.demo.world import World, enter_part, from_middle
 from ars_web.geometry.camera import Camera, normalised_from_pixels
 from ars_web.geometry.rigid_transform import Transform
 
@@ -80,16 +80,25 @@ def _look(
     alone: Bool[np.ndarray, "b h w"],
 ) -> None:
     origin = (T[0, 3], T[1, 3], T[2, 3])
+    # All rays start at one place, from which most of them pass by most parts: that is asked first, and quickly.
+    to_middles, gaps = np.empty((len(parts), 3)), np.empty(len(parts))
+    for k in range(len(parts)):
+        x, y, z = from_middle(parts[k], origin)
+        to_middles[k, 0], to_middles[k, 1], to_middles[k, 2] = -x, -y, -z
+        gaps[k] = x * x + y * y + z * z - parts[k].reach ** 2
     for i in range(rays.shape[0]):
         for j in range(rays.shape[1]):
             direction = _world_ray(T, rays[i, j, 0], rays[i, j, 1])
             nearest, owner, number = MISS, -1, -1
-            for part in range(len(parts)):
-                t, surface = enter_part(parts[part], origin, direction)
-                if t < MISS and parts[part].owner >= 0:
-                    alone[parts[part].owner, i, j] = True
+            for k in range(len(parts)):
+                towards = dot((to_middles[k, 0], to_middles[k, 1], to_middles[k, 2]), direction)
+                if gaps[k] > 0 and (towards < 0 or towards * towards < gaps[k]):
+                    continue
+                t, surface = enter_part(parts[k], origin, direction)
+                if t < MISS and parts[k].owner >= 0:
+                    alone[parts[k].owner, i, j] = True
                 if t < nearest:
-                    nearest, owner, number = t, parts[part].owner, surface
+                    nearest, owner, number = t, parts[k].owner, surface
             objects[i, j], surfaces[i, j], depths[i, j] = owner, number, nearest
 
 

@@ -1,7 +1,7 @@
 """What lies on the desk, and where the camera goes: metres, z up, the desk's top at z = 0."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -48,7 +48,7 @@ PRINTED_TIN = Finish(mirror=0.10, gloss=0.4, sharpness=60)
 WOOD = Finish(mirror=0.0, gloss=0.10, sharpness=26)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Part:
     """One shape of an object.
 
@@ -57,12 +57,15 @@ class Part:
         size: the shape's up to four lengths.
         middle: of the shape in the object's building frame (axes along the object's own).
         looks: one (picture, finish) a surface.
+        rolled: (3, 3) how the shape is turned in the building frame. It turns the picture only: a ball any way, a
+            cylinder about its axis.
     """
 
     kind: int
     size: tuple[float, ...]
     middle: tuple[float, float, float]
     looks: tuple[tuple[str, Finish], ...]
+    rolled: Float[np.ndarray, "3 3"] = field(default_factory=lambda: np.eye(3))
 
     @property
     def extent(self) -> Float[np.ndarray, "2 3"]:
@@ -110,13 +113,11 @@ def _standing(x: float, y: float, *, turn: float, z: float = 0.0) -> Transform:
     return rigid_transform.from_rotation(rigid_transform.rotation_about_z(math.radians(turn)), np.array([x, y, z]))
 
 
-def _lying(x: float, y: float, *, turn: float, roll: float, radius: float) -> Transform:
-    """A round thing on its side: its axis is horizontal, along `turn`, and it has rolled by `roll` degrees."""
+def _lying(x: float, y: float, *, turn: float, radius: float) -> Transform:
+    """A round thing on its side: its axis is horizontal, along `turn`."""
     tipped = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
     yaw = rigid_transform.rotation_about_z(math.radians(turn))
-    return rigid_transform.from_rotation(
-        yaw @ tipped @ rigid_transform.rotation_about_z(math.radians(roll)), np.array([x, y, radius])
-    )
+    return rigid_transform.from_rotation(yaw @ tipped, np.array([x, y, radius]))
 
 
 def _carton(half: tuple[float, float, float], faces: tuple[str, ...], finish: Finish) -> tuple[Part, ...]:
@@ -152,9 +153,22 @@ def _mug(radius: float, height: float) -> tuple[Part, ...]:
     )
 
 
-def _can(radius: float, height: float, wrap: str, end: str, *, middle: float) -> tuple[Part, ...]:
+def _can(radius: float, height: float, wrap: str, end: str) -> tuple[Part, ...]:
     looks = ((wrap, PRINTED_TIN), (end, TIN), (end, TIN))
-    return (Part(shapes.CYLINDER, (radius, height / 2), (0.0, 0.0, middle), looks),)
+    return (Part(shapes.CYLINDER, (radius, height / 2), (0.0, 0.0, height / 2), looks),)
+
+
+def _can_that_rolled(radius: float, height: float, wrap: str, end: str, *, roll: float) -> tuple[Part, ...]:
+    """A can about its middle, its label turned by `roll` degrees."""
+    (standing,) = _can(radius, height, wrap, end)
+    rolled = rigid_transform.rotation_about_z(math.radians(roll))
+    return (replace(standing, middle=(0.0, 0.0, 0.0), rolled=rolled),)
+
+
+def _ball(radius: float, picture: str, finish: Finish, *, came_to_rest: tuple[float, ...]) -> tuple[Part, ...]:
+    """A ball, its poles wherever they were when it stopped: a quaternion w x y z."""
+    rolled = rigid_transform.rotation_from_wxyz(np.array(came_to_rest))
+    return (Part(shapes.BALL, (radius,), (0.0, 0.0, radius), ((picture, finish),), rolled),)
 
 
 def things() -> tuple[Thing, ...]:
@@ -167,14 +181,24 @@ def things() -> tuple[Thing, ...]:
         Thing("box", "tea", _carton((0.062, 0.031, 0.081), tea, CARD), _standing(-0.06, 0.145, turn=-22)),
         Thing("box", "chocolate", _carton((0.10, 0.05, 0.0145), chocolate, CARD), _standing(0.165, -0.015, turn=-32)),
         Thing("box", "die", _carton((0.021, 0.021, 0.021), die, LACQUER), _standing(0.195, -0.045, turn=23, z=0.029)),
-        Thing("ball", "tennis ball", _ball(0.0335, "tennis", FELT), _rolled(0.055, -0.165, radius=0.0335, turn=40)),
-        Thing("ball", "beach ball", _ball(0.058, "beach", LACQUER), _rolled(0.17, 0.165, radius=0.058, turn=115)),
-        Thing("can", "cola", _can(0.033, 0.115, "cola", "can end", middle=0.0575), _standing(0.03, 0.02, turn=-75)),
+        Thing(
+            "ball",
+            "tennis ball",
+            _ball(0.0335, "tennis", FELT, came_to_rest=(0.6, 0.5, -0.3, 0.4)),
+            _standing(0.055, -0.165, turn=20),
+        ),
+        Thing(
+            "ball",
+            "beach ball",
+            _ball(0.058, "beach", LACQUER, came_to_rest=(0.5, 0.62, 0.55, -0.2)),
+            _standing(0.17, 0.165, turn=-30),
+        ),
+        Thing("can", "cola", _can(0.033, 0.115, "cola", "can end"), _standing(0.03, 0.02, turn=-75)),
         Thing(
             "can",
             "tomatoes",
-            _can(0.0375, 0.105, "tomato", "tin end", middle=0.0),
-            _lying(-0.105, -0.15, turn=38, roll=200, radius=0.0375),
+            _can_that_rolled(0.0375, 0.105, "tomato", "tin end", roll=200),
+            _lying(-0.105, -0.15, turn=38, radius=0.0375),
         ),
         Thing("mug", "mug", _mug(0.041, 0.095), _standing(-0.185, -0.015, turn=215)),
         Thing(
@@ -183,17 +207,6 @@ def things() -> tuple[Thing, ...]:
             (Part(shapes.TUBE, (0.051, 0.038, 0.024), (0.0, 0.0, 0.024), tape),),
             _standing(-0.235, 0.145, turn=10),
         ),
-    )
-
-
-def _ball(radius: float, picture: str, finish: Finish) -> tuple[Part, ...]:
-    return (Part(shapes.BALL, (radius,), (0.0, 0.0, 0.0), ((picture, finish),)),)
-
-
-def _rolled(x: float, y: float, *, radius: float, turn: float) -> Transform:
-    """A ball that came to rest with its poles wherever they were."""
-    return _lying(x, y, turn=turn, roll=55, radius=radius) @ rigid_transform.from_position_wxyz(
-        np.zeros(3), np.array([0.88, 0.12, 0.42, 0.1])
     )
 
 
