@@ -12,6 +12,7 @@ from ars_web.datasets.jobs import plan_export, run_export
 from ars_web.datasets.options import ExportOptions
 from ars_web.datasets.preview import preview
 from ars_web.demo.recording import make_demo
+from ars_web.demo.truth import TRUTH_FILE
 from ars_web.recordings.recording import RecordedBox
 from ars_web.recordings.registry import read_recording
 from ars_web.sessions.store import SessionStore
@@ -50,6 +51,10 @@ def prepare(sessions: Path, *, show: Callable[[str], AbstractContextManager[OnPr
         truth = make_demo(recording, progress=advance)
     with SessionStore(sessions) as store:
         made = next((summary for summary in store.list() if Path(summary.source) == recording), None)
+        if made is not None and made.created.timestamp() < (recording / TRUTH_FILE).stat().st_mtime:
+            # A newer version of the program rendered other images, which these boxes do not fit. It can be restored.
+            store.delete(made.id)
+            made = None
         if made is None:
             boxes = tuple(RecordedBox(o.class_name, o.box) for o in truth.objects)
             read = replace(read_recording(recording, format="ars"), class_names=truth.class_names, boxes=boxes)

@@ -352,6 +352,13 @@ def test_the_demo_is_made_once_and_exported_anew_when_its_session_changes(run: C
     assert (report["sessions"][0]["revision"], changed["sessions"][0]["revision"]) == (0, 1)
     assert len(json.loads(run("list", "--json").stdout)) == 1
 
+    # As if a newer version had rendered the images again: the session that was made from the old ones goes.
+    (home / "recording" / "truth.json").touch()
+    run("demo", "--no-browser")
+    (fresh,) = json.loads(run("list", "--json").stdout)
+    assert fresh["id"] != report["sessions"][0]["id"]
+    assert fresh["revision"] == 0
+
 
 def test_version_and_help_name_every_command(run: Commands) -> None:
     assert run("--version").stdout.startswith("ars-web ")
