@@ -61,11 +61,12 @@ def _dependencies() -> Iterator[Finding]:
     except metadata.PackageNotFoundError:
         yield Finding("dependencies", True, "not looked at: ars-web is run from its checkout without being installed")
         return
-    wrong = [line for line in map(_unmet, map(Requirement, lines)) if line]
+    wanted = [r for r in map(Requirement, lines) if r.marker is None or r.marker.evaluate({"extra": ""})]
+    wrong = [line for line in map(_unmet, wanted) if line]
     yield Finding(
         "dependencies",
         not wrong,
-        "; ".join(wrong) or f"all {len(lines)} as asked for",
+        "; ".join(wrong) or f"all {len(wanted)} as asked for",
         "install ars-web again: `pip install --upgrade ars-web`, or `make demo` in a checkout",
     )
     broken: list[str] = []
@@ -83,9 +84,7 @@ def _dependencies() -> Iterator[Finding]:
 
 
 def _unmet(wanted: Requirement) -> str | None:
-    """What is wrong with a dependency; None where nothing is, or where it is only wanted by an extra."""
-    if wanted.marker is not None and not wanted.marker.evaluate({"extra": ""}):
-        return None
+    """What is wrong with a dependency; None where nothing is."""
     try:
         version = metadata.version(wanted.name)
     except metadata.PackageNotFoundError:
