@@ -9,7 +9,7 @@ import os
 import shutil
 import stat
 from functools import lru_cache
-from pathlib import Path, PurePath
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -35,13 +35,13 @@ _NO_LINK = frozenset({errno.EXDEV, errno.EPERM, errno.EACCES, errno.EMLINK, errn
 
 def image_name(stem: str, source: str, *, only_jpeg: bool) -> str:
     """The file name of an image in the dataset: JPEG and PNG keep their extension, in lower case."""
-    suffix = PurePath(source).suffix.lower()
+    suffix = _suffix(source)
     if suffix in _JPEG_SUFFIXES:
         return stem + (".jpg" if only_jpeg else suffix)
     return stem + (".jpg" if only_jpeg else ".png")
 
 
-def place_image(source: str, target: Path, *, camera: Camera, stamp: tuple[int, int], images: str) -> None:
+def place_image(source: str, target: str, *, camera: Camera, stamp: tuple[int, int], images: str) -> None:
     """Put the image `source` at `target` as the export option `images` says (not for `none`).
 
     `stamp` is the size in bytes and the time of change in ns that the source had when the export was planned. An
@@ -106,12 +106,16 @@ def _checked(source: str, stamp: tuple[int, int]) -> str:
     return source
 
 
-def _same_encoding(source: str, target: Path) -> bool:
-    a, b = PurePath(source).suffix.lower(), target.suffix
+def _same_encoding(source: str, target: str) -> bool:
+    a, b = _suffix(source), _suffix(target)
     return a == b or (a in _JPEG_SUFFIXES and b in _JPEG_SUFFIXES)
 
 
-def _link(source: str, target: Path) -> None:
+def _suffix(path: str) -> str:
+    return os.path.splitext(path)[1].lower()  # noqa: PTH122 - paths are strings here, this runs once an image
+
+
+def _link(source: str, target: str) -> None:
     try:
         os.link(source, target)
     except OSError as error:
@@ -120,8 +124,8 @@ def _link(source: str, target: Path) -> None:
         shutil.copyfile(source, target)
 
 
-def _encode(image: UInt8[np.ndarray, "h w 3"], target: Path) -> None:
-    quality = [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY] if target.suffix in _JPEG_SUFFIXES else []
-    ok, content = cv2.imencode(target.suffix, image, quality)
-    assert ok, f"OpenCV cannot encode {target.suffix}"
-    target.write_bytes(content.data)
+def _encode(image: UInt8[np.ndarray, "h w 3"], target: str) -> None:
+    quality = [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY] if _suffix(target) in _JPEG_SUFFIXES else []
+    ok, content = cv2.imencode(_suffix(target), image, quality)
+    assert ok, f"OpenCV cannot encode {target}"
+    Path(target).write_bytes(content.data)

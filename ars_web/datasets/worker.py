@@ -184,7 +184,7 @@ def _place_images(plan: ExportPlan, number: int, shard: Shard, files: Path, chec
         check()
         place_image(
             frames.sources[start + i],
-            folders[split] / name,
+            f"{folders[split]}/{name}",
             camera=cameras[int(frames.camera_id[start + i])],
             stamp=stamp,
             images=plan.options.images,

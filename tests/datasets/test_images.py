@@ -35,7 +35,7 @@ def stamp(path: str) -> tuple[int, int]:
 
 
 def place(path: str, target: Path, *, camera: Camera = FLAT, images: str = "link") -> Path:
-    place_image(path, target, camera=camera, stamp=stamp(path), images=images)
+    place_image(path, str(target), camera=camera, stamp=stamp(path), images=images)
     return target
 
 
