@@ -1,4 +1,4 @@
-"""The one way in which this package compiles functions."""
+"""How this package compiles functions."""
 
 from numba import njit
 
@@ -7,3 +7,7 @@ compiled = njit(nogil=True, error_model="numpy")
 
 Nothing is cached on disk: numba looks at the caller's source only, and would go on using shapes as they were before
 an edit. The recording is made once, so that little is lost."""
+
+copied_in = njit(nogil=True, error_model="numpy", inline="always")
+"""The same for what has one caller or is short: it becomes a part of its callers before they are compiled, which
+spares compiling it for itself."""

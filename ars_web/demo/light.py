@@ -10,7 +10,7 @@ import math
 import numpy as np
 from jaxtyping import Float, Shaped
 
-from ars_web.demo.compiled import compiled
+from ars_web.demo.compiled import compiled, copied_in
 from ars_web.demo.shapes import MISS, Vector, along, dot, surface_point, unit
 from ars_web.demo.world import World, blocked, buried, light_grid, three, trace, turned
 
@@ -38,7 +38,7 @@ FLOOR, RAIL, ROOM = -0.74, 0.12, 3.2
 """Heights of the floor and of the rail on the walls, from the desk's top, and half the room's width."""
 
 
-@compiled
+@copied_in
 def room(origin: Vector, direction: Vector) -> Vector:
     """The colour of what lies behind everything, out of focus: a floor, and walls with a panel up to a rail."""
     t = MISS
@@ -61,13 +61,13 @@ def room(origin: Vector, direction: Vector) -> Vector:
     return shade * (r + rail * (0.55 - r)), shade * (g + rail * (0.54 - g)), shade * (b + rail * (0.51 - b))
 
 
-@compiled
+@copied_in
 def _soft_step(x: float, edge: float, soft: float) -> float:
     """0 well below the edge, 1 well above."""
     return min(max(0.5 + (x - edge) / (2 * soft), 0.0), 1.0)
 
 
-@compiled
+@copied_in
 def _sky(direction: Vector) -> Vector:
     """All-round light from the room in a direction, brighter from above and from the window's side."""
     up = 0.5 + 0.5 * direction[2]
@@ -117,7 +117,7 @@ def bake_rows(world: World, index: int, surface: int, first: int, last: int) -> 
             lights[cell, 1], lights[cell, 2], lights[cell, 3] = _light_all_round(parts, world.surfaces, origin, normal)
 
 
-@compiled
+@copied_in
 def _window_light(parts: Shaped[np.ndarray, "p"], origin: Vector, normal: Vector) -> tuple[float, float]:
     """Irradiance from the window, 1 at the desk's middle facing it, and the share of the window that is seen."""
     n = 8
@@ -140,7 +140,7 @@ def _window_light(parts: Shaped[np.ndarray, "p"], origin: Vector, normal: Vector
     return total / (n * n), seen / (n * n)
 
 
-@compiled
+@copied_in
 def _light_all_round(
     parts: Shaped[np.ndarray, "p"], surfaces: Shaped[np.ndarray, "s"], origin: Vector, normal: Vector
 ) -> Vector:

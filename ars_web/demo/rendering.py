@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int16, Shaped, UInt8
 
 from ars_web.demo import noise
-from ars_web.demo.compiled import compiled
+from ars_web.demo.compiled import compiled, copied_in
 from ars_web.demo.shading import UNKNOWN, colour_along
 from ars_web.demo.shapes import MISS, Vector, dot, unit
 from ars_web.demo.world import World, enter_part, from_middle
@@ -175,7 +175,7 @@ def _paint(
                 out[i, j, channel] = int(tone + 0.5)
 
 
-@compiled
+@copied_in
 def _on_edge(surfaces: Int16[np.ndarray, "h w"], depths: Float[np.ndarray, "h w"], i: int, j: int) -> bool:
     for di, dj in ((0, 1), (0, -1), (1, 0), (-1, 0)):
         y, x = i + di, j + dj
@@ -187,7 +187,7 @@ def _on_edge(surfaces: Int16[np.ndarray, "h w"], depths: Float[np.ndarray, "h w"
     return False
 
 
-@compiled
+@copied_in
 def _ray_within_pixel(rays: Float[np.ndarray, "h w 2"], i: int, j: int, column: int, row: int) -> tuple[float, float]:
     """(x/z, y/z) of one of SUBPIXELS x SUBPIXELS rays, from the slope of the table of rays round the pixel."""
     height, width = rays.shape[0], rays.shape[1]

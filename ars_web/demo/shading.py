@@ -8,7 +8,7 @@ import math
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from ars_web.demo.compiled import compiled
+from ars_web.demo.compiled import compiled, copied_in
 from ars_web.demo.light import WINDOW, WINDOW_LIGHT, room, window_in_mirror
 from ars_web.demo.shapes import Vector, along, dot, surface_coordinates, unit
 from ars_web.demo.world import (
@@ -39,7 +39,7 @@ def _cell(position: float, count: int, wraps: bool) -> tuple[int, int, float]:
     return min(max(i, 0), count - 1), min(max(i + 1, 0), count - 1), share
 
 
-@compiled
+@copied_in
 def _texel(texels: UInt8[np.ndarray, "n 3"], surface: SurfaceRecord, level: int, u: float, v: float) -> Vector:
     """A picture at (u, v) on one level, between its four nearest texels, still square roots times 255."""
     table = surface.levels
@@ -56,7 +56,7 @@ def _texel(texels: UInt8[np.ndarray, "n 3"], surface: SurfaceRecord, level: int,
     )
 
 
-@compiled
+@copied_in
 def _picture(texels: UInt8[np.ndarray, "n 3"], surface: SurfaceRecord, u: float, v: float, footprint: float) -> Vector:
     """Linear colour of a surface at (u, v), blurred over `footprint` metres: between two levels (mipmaps)."""
     level = min(max(math.log2(footprint * surface.density), 0.0), LEVEL_COUNT - 1.001)
@@ -71,7 +71,7 @@ def _picture(texels: UInt8[np.ndarray, "n 3"], surface: SurfaceRecord, u: float,
     return r * r / 65025.0, g * g / 65025.0, b * b / 65025.0
 
 
-@compiled
+@copied_in
 def _light(lights: Float[np.ndarray, "m 5"], surface: SurfaceRecord, u: float, v: float) -> tuple[Vector, float]:
     """The baked light at (u, v), and the share of the window that is seen from there."""
     start, height, width = light_grid(surface)
@@ -153,7 +153,7 @@ def colour_along(world: World, origin: Vector, direction: Vector, t: float, surf
     return r, g, b
 
 
-@compiled
+@copied_in
 def _highlight(look: SurfaceRecord, point: Vector, normal: Vector, direction: Vector) -> float:
     """Blinn and Phong's highlight of the window."""
     if look.gloss == 0:

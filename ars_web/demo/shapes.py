@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from ars_web.demo.compiled import compiled
+from ars_web.demo.compiled import compiled, copied_in
 
 Vector = tuple[float, float, float]
 
@@ -62,7 +62,7 @@ def enter(kind: int, size: Vector, origin: Vector, direction: Vector) -> tuple[f
     return _enter_handle(size[0], size[1], size[2], origin, direction)
 
 
-@compiled
+@copied_in
 def _enter_box(size: Vector, origin: Vector, direction: Vector) -> tuple[float, int]:
     near, far, surface = -np.inf, np.inf, 0
     for axis in range(3):
@@ -83,7 +83,7 @@ def _enter_box(size: Vector, origin: Vector, direction: Vector) -> tuple[float, 
     return near, surface
 
 
-@compiled
+@copied_in
 def _enter_ball(radius: float, origin: Vector, direction: Vector) -> tuple[float, int]:
     b = dot(origin, direction)
     under_root = b * b - dot(origin, origin) + radius * radius
@@ -122,7 +122,7 @@ def _enter_end(inner: float, outer: float, half: float, origin: Vector, directio
     return t, upper
 
 
-@compiled
+@copied_in
 def _enter_cylinder(radius: float, half: float, origin: Vector, direction: Vector) -> tuple[float, int]:
     t, _ = _across_wall(radius, origin, direction)
     if 0 < t < MISS and abs(origin[2] + t * direction[2]) <= half:
@@ -131,7 +131,7 @@ def _enter_cylinder(radius: float, half: float, origin: Vector, direction: Vecto
     return t, 2 if upper else 1
 
 
-@compiled
+@copied_in
 def _enter_tube(outer: float, inner: float, half: float, origin: Vector, direction: Vector) -> tuple[float, int]:
     best, upper = _enter_end(inner, outer, half, origin, direction)
     surface = 3 if upper else 2
@@ -145,7 +145,7 @@ def _enter_tube(outer: float, inner: float, half: float, origin: Vector, directi
     return best, surface
 
 
-@compiled
+@copied_in
 def _enter_handle(ring: float, thick: float, least_x: float, origin: Vector, direction: Vector) -> tuple[float, int]:
     # Sphere tracing (Hart 1996): the distance to the shape is a step that cannot pass it.
     reach = ring + thick

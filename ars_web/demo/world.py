@@ -5,7 +5,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from jaxtyping import Float, Int, Shaped, UInt8
 
-from ars_web.demo.compiled import compiled
+from ars_web.demo.compiled import compiled, copied_in
 from ars_web.demo.shapes import MISS, Vector, dot, enter, holds
 
 PART = np.dtype(
@@ -91,12 +91,12 @@ class World(NamedTuple):
     lights: Float[np.ndarray, "m 5"]
 
 
-@compiled
+@copied_in
 def three(row: Float[np.ndarray, "3"]) -> Vector:
     return row[0], row[1], row[2]
 
 
-@compiled
+@copied_in
 def light_grid(surface: SurfaceRecord) -> tuple[int, int, int]:
     """First row in `lights`, height and width of a surface's grid of light."""
     grid = surface.light_grid
@@ -157,7 +157,7 @@ def trace(parts: Shaped[np.ndarray, "p"], origin: Vector, direction: Vector) -> 
     return nearest, hit
 
 
-@compiled
+@copied_in
 def blocked(parts: Shaped[np.ndarray, "p"], origin: Vector, direction: Vector, distance: float) -> bool:
     for i in range(len(parts)):
         t, _ = enter_part(parts[i], origin, direction)
@@ -166,7 +166,7 @@ def blocked(parts: Shaped[np.ndarray, "p"], origin: Vector, direction: Vector, d
     return False
 
 
-@compiled
+@copied_in
 def buried(parts: Shaped[np.ndarray, "p"], point: Vector) -> bool:
     for i in range(len(parts)):
         part = parts[i]
