@@ -87,7 +87,7 @@ def iou(a: Box, b: Box) -> float:
         return 0.0
     corners = HalfspaceIntersection(halfspaces, centre).intersections
     shared = float(ConvexHull(corners).volume)
-    return shared / (a.volume + b.volume - shared)
+    return min(shared / (a.volume + b.volume - shared), 1.0)
 
 
 def _halfspaces(box: Box) -> Float[np.ndarray, "6 4"]:

@@ -120,10 +120,11 @@ def distorted_from_normalised(camera: Camera, normalised: Float[np.ndarray, "*n 
 
     Equations: OpenCV, "Camera Calibration and 3D Reconstruction" and "Fisheye camera model".
     """
-    x, y = normalised[..., 0], normalised[..., 1]
+    points = normalised.reshape(-1, 2)
+    x, y = points[:, 0], points[:, 1]
     r2 = x * x + y * y
     if camera.model == "pinhole":
-        out = np.array(normalised, dtype=np.float64)
+        out = np.array(points, dtype=np.float64)
     elif camera.model == "brown":
         k1, k2, p1, p2, k3 = camera.distortion
         radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
@@ -134,9 +135,9 @@ def distorted_from_normalised(camera: Camera, normalised: Float[np.ndarray, "*n 
     else:
         r = np.sqrt(r2)
         scale = np.where(r > 1e-12, _fisheye_angle(camera, np.arctan(r)) / np.maximum(r, 1e-12), 1.0)
-        out = normalised * scale[..., None]
+        out = points * scale[:, None]
     out[~(r2 <= camera.valid_radius**2)] = np.nan
-    return out
+    return out.reshape(normalised.shape)
 
 
 def _fisheye_angle(camera: Camera, theta: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
@@ -283,13 +284,17 @@ def rectified(camera: Camera) -> Camera:
     # Where a side's ray does not exist, the image reaches beyond the widest angle there.
     x0, y0 = _innermost(left[:, 0], limit=-widest), _innermost(top[:, 1], limit=-widest)
     x1, y1 = -_innermost(-right[:, 0], limit=-widest), -_innermost(-bottom[:, 1], limit=-widest)
-    if not (x0 < x1 and y0 < y1):
-        raise BadInput(f"no rectified image can be cut out of this camera's: {camera}")
     corner = math.hypot(max(-x0, x1), max(-y0, y1))
     shrink = min(1.0, 0.999 * camera.valid_radius / corner)
     x0, x1, y0, y1 = (shrink * side for side in (x0, x1, y0, y1))
-    fx, fy = camera.width / (x1 - x0), camera.height / (y1 - y0)
-    return Camera(camera.width, camera.height, fx, fy, -0.5 - fx * x0, -0.5 - fy * y0)
+    if x0 < x1 and y0 < y1:
+        fx, fy = camera.width / (x1 - x0), camera.height / (y1 - y0)
+        flat = Camera(camera.width, camera.height, fx, fy, -0.5 - fx * x0, -0.5 - fy * y0)
+        border = pixels_from_normalised(camera, normalised_from_pixels(flat, image_border_pixels(flat)))
+        half = np.array([camera.width, camera.height]) / 2
+        if (np.abs(image_from_pixels(border) - half) < half + 0.1).all():
+            return flat
+    raise BadInput(f"no rectified image can be cut out of this camera's: {camera}")
 
 
 def _innermost(side: Float[np.ndarray, "n"], *, limit: float) -> float:

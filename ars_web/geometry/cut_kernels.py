@@ -1,13 +1,146 @@
-"""The compiled loop that cuts rings to the image.
+"""The compiled loops that cut rings and curves to the image, and label what is left of them.
 
-Kernels call only kernels of their own file: numba's cache notices a change only in the file of the function that it
-keeps.
+Coordinates are image coordinates; rings run counter-clockwise as seen in the image, y down. Kernels call only kernels
+of their own file: numba's cache notices a change only in the file of the function that it keeps.
 """
 
 import numpy as np
 from numba import njit
 
 Array = np.ndarray
+
+
+@njit(error_model="numpy", forceinline=True)
+def in_image(width: float, height: float, u0: float, v0: float, u1: float, v1: float) -> tuple[float, float]:
+    """The part (from, to) of a straight piece, in [0, 1], that lies in the image; (1, 0) where none does."""
+    low, high = 0.0, 1.0
+    for axis in range(2):
+        start, along, side = (u0, u1 - u0, width) if axis == 0 else (v0, v1 - v0, height)
+        if along == 0.0:
+            if not 0.0 <= start <= side:
+                return 1.0, 0.0
+        else:
+            a, b = -start / along, (side - start) / along
+            low, high = max(low, min(a, b)), min(high, max(a, b))
+    return (low, high) if low <= high else (1.0, 0.0)
+
+
+@njit(error_model="numpy", forceinline=True)
+def clamped_integral(v: float, height: float) -> float:
+    """Integral of min(max(v, 0), height) from 0 to v."""
+    return 0.0 if v <= 0.0 else (0.5 * v * v if v <= height else height * (v - 0.5 * height))
+
+
+@njit(error_model="numpy", forceinline=True)
+def area_in_image(width: float, height: float, u0: float, v0: float, u1: float, v1: float) -> float:
+    """What one side of a ring adds to the area of the ring within the image: the integral of v, clamped to the
+    image's height, over the part of u within its width. Its sum over any ring is the signed area."""
+    if u0 == u1:
+        return 0.0
+    if v0 >= height and v1 >= height:
+        return height * (min(max(u1, 0.0), width) - min(max(u0, 0.0), width))
+    slope = (v1 - v0) / (u1 - u0)
+    ua, ub = min(max(u0, 0.0), width), min(max(u1, 0.0), width)
+    va, vb = v0 + slope * (ua - u0), v0 + slope * (ub - u0)
+    if 0.0 <= va <= height and 0.0 <= vb <= height:
+        return 0.5 * (va + vb) * (ub - ua)
+    if abs(vb - va) < 1e-9:
+        return min(max(va, 0.0), height) * (ub - ua)
+    return (clamped_integral(vb, height) - clamped_integral(va, height)) / (vb - va) * (ub - ua)
+
+
+@njit(error_model="numpy", forceinline=True)
+def place_in_image(width: float, height: float, u: float, v: float) -> tuple[float, float]:
+    """A point of the image without what rounding put beyond its borders."""
+    return min(max(u, 0.0), width), min(max(v, 0.0), height)
+
+
+@njit(error_model="numpy", forceinline=True)
+def start_bbox(bbox: Array) -> None:
+    """A box of nothing."""
+    bbox[0], bbox[1], bbox[2], bbox[3] = np.inf, np.inf, -np.inf, -np.inf
+
+
+@njit(error_model="numpy", forceinline=True)
+def grow_bbox(bbox: Array, u: float, v: float) -> None:
+    """Make a box hold a point."""
+    bbox[0], bbox[1] = min(bbox[0], u), min(bbox[1], v)
+    bbox[2], bbox[3] = max(bbox[2], u), max(bbox[3], v)
+
+
+@njit(error_model="numpy")
+def label_of_ring(width: float, height: float, ring: Array, missed: float, bbox: Array) -> float:
+    """The box of the part of a ring's inside that lies in the image, written to `bbox`, and the share of its area
+    that does not. The corners of the part are the ring's own, where it crosses the image's border, and the image's
+    corners that it holds. `missed` is the area that the ring's chords cut off outside the image."""
+    start_bbox(bbox)
+    whole, part = missed, 0.0
+    top_left, top_right, bottom_left, bottom_right = False, False, False, False
+    u0, v0 = ring[len(ring) - 1, 0], ring[len(ring) - 1, 1]
+    inside_before = 0.0 <= u0 <= width and 0.0 <= v0 <= height
+    for i in range(len(ring)):
+        u1, v1 = ring[i, 0], ring[i, 1]
+        area = 0.5 * (v0 + v1) * (u1 - u0)
+        whole += area
+        inside = 0.0 <= u1 <= width and 0.0 <= v1 <= height
+        if inside and inside_before:
+            part += area
+            grow_bbox(bbox, u1, v1)
+        elif not ((u0 <= 0.0 and u1 <= 0.0) or (u0 >= width and u1 >= width) or (v0 <= 0.0 and v1 <= 0.0)):
+            part += area_in_image(width, height, u0, v0, u1, v1)
+            low, high = in_image(width, height, u0, v0, u1, v1)
+            if low <= high:
+                grow_bbox(bbox, u0 + low * (u1 - u0), v0 + low * (v1 - v0))
+                grow_bbox(bbox, u0 + high * (u1 - u0), v0 + high * (v1 - v0))
+            # A ring holds a corner that it passes below an odd number of times.
+            if (u0 > 0.0) != (u1 > 0.0):
+                v = v0 - u0 / (u1 - u0) * (v1 - v0)
+                top_left, bottom_left = top_left != (v > 0.0), bottom_left != (v > height)
+            if (u0 >= width) != (u1 >= width):
+                v = v0 + (width - u0) / (u1 - u0) * (v1 - v0)
+                top_right, bottom_right = top_right != (v > 0.0), bottom_right != (v > height)
+        u0, v0, inside_before = u1, v1, inside
+    if top_left:
+        grow_bbox(bbox, 0.0, 0.0)
+    if top_right:
+        grow_bbox(bbox, width, 0.0)
+    if bottom_left:
+        grow_bbox(bbox, 0.0, height)
+    if bottom_right:
+        grow_bbox(bbox, width, height)
+    bbox[0], bbox[1] = place_in_image(width, height, bbox[0], bbox[1])
+    bbox[2], bbox[3] = place_in_image(width, height, bbox[2], bbox[3])
+    if not (bbox[0] < bbox[2] and bbox[1] < bbox[3]):
+        bbox[:] = np.nan
+        return 1.0
+    return min(max(1.0 - part / whole, 0.0), 1.0) if whole != 0.0 else 0.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def label_rings(
+    width: float,
+    height: float,
+    points: Array,
+    lengths: Array,
+    missed: Array,
+    bboxes: Array,
+    bboxes_amodal: Array,
+    truncated: Array,
+) -> None:
+    """Labels of those of m boxes that have a ring, the rings one after the other in `points` (k, 2) and what they
+    `missed` (m,) outside, written to `bboxes` (m, 4) and `truncated` (m,), and to `bboxes_amodal` (m, 4) where that is
+    NaN."""
+    start = 0
+    for i in range(len(lengths)):
+        if lengths[i] == 0:
+            continue
+        ring = points[start : start + lengths[i]]
+        start += lengths[i]
+        truncated[i] = label_of_ring(width, height, ring, missed[i], bboxes[i])
+        if np.isnan(bboxes_amodal[i, 0]):
+            start_bbox(bboxes_amodal[i])
+            for j in range(len(ring)):
+                grow_bbox(bboxes_amodal[i], ring[j, 0], ring[j, 1])
 
 
 @njit(error_model="numpy")
@@ -96,3 +229,32 @@ def cut_rings(width: float, height: float, points: Array, lengths: Array) -> tup
         start += lengths[i]
         k += m
     return cut[:k].copy(), counts
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def cut_curves(width: float, height: float, points: Array, lengths: Array) -> tuple[Array, Array]:
+    """Curves, one after the other in `points` (k, 2), cut to the image: all points left, and how many each part has; a
+    curve leaves none, one, or more where it leaves the image and comes back."""
+    found = np.empty((2 * len(points), 2))
+    counts = np.zeros(len(points), np.int64)
+    start, k, parts = 0, 0, 0
+    for n in lengths:
+        joined = False
+        for i in range(start, start + n - 1):
+            u, v = points[i, 0], points[i, 1]
+            du, dv = points[i + 1, 0] - u, points[i + 1, 1] - v
+            low, high = in_image(width, height, u, v, u + du, v + dv)
+            if low >= high:
+                joined = False
+                continue
+            if not joined or low > 0.0:
+                found[k, 0], found[k, 1] = place_in_image(width, height, u + low * du, v + low * dv)
+                counts[parts] = 1
+                parts += 1
+                k += 1
+            found[k, 0], found[k, 1] = place_in_image(width, height, u + high * du, v + high * dv)
+            counts[parts - 1] += 1
+            k += 1
+            joined = high == 1.0
+        start += n
+    return found[:k].copy(), counts[:parts].copy()

@@ -60,16 +60,23 @@ def labels_of_boxes(
 
     def label(frames: slice) -> None:
         polygons, corners = _shadows(Ts_world_camera[frames], Ts_world_box, sizes)
-        lens_kernels.label_shadows(
-            tables.lens,
-            tables.bends,
-            tables.image_corners,
-            polygons,
-            corners,
-            tolerance,
-            found.bbox[frames],
-            found.bbox_amodal[frames],
-            found.truncated[frames],
+        bbox, amodal, truncated = found.bbox[frames], found.bbox_amodal[frames], found.truncated[frames]
+        unsettled = np.empty(corners.shape, dtype=np.bool_)
+        lens_kernels.boxes_of_shadows(
+            tables.lens, tables.bends, polygons, corners, tolerance, bbox, amodal, truncated, unsettled
+        )
+        points, lengths, missed = lens_kernels.rings_of_shadows(
+            tables.lens, tables.bends, polygons, corners, unsettled, tolerance
+        )
+        cut_kernels.label_rings(
+            tables.lens.width,
+            tables.lens.height,
+            points,
+            lengths,
+            missed,
+            bbox.reshape(-1, 4),
+            amodal.reshape(-1, 4),
+            truncated.reshape(-1),
         )
 
     over_blocks(label, n, block=_block(b))
@@ -99,7 +106,7 @@ def outlines(
 
     def rings(frames: slice) -> tuple[np.ndarray, np.ndarray]:
         polygons, corners = _shadows(Ts_world_camera[frames], Ts_world_box, sizes)
-        points, lengths = lens_kernels.rings_of_shadows(
+        points, lengths, _ = lens_kernels.rings_of_shadows(
             tables.lens, tables.bends, polygons, corners, np.ascontiguousarray(wanted[frames]), tolerance
         )
         return cut_kernels.cut_rings(tables.lens.width, tables.lens.height, points, lengths)
@@ -137,7 +144,8 @@ def wireframe(
     T = np.array(T_world_camera, dtype=np.float64, order="C")
     n = shadow_kernels.cast_edges(T, np.array(box.T_world_box), box.size / 2, NEAR, edges)
     tables = lens_tables(camera)
-    points, lengths = lens_kernels.curves_of_edges(tables.lens, tables.bends, edges[:n], tolerance)
+    curves = lens_kernels.curves_of_edges(tables.lens, tables.bends, edges[:n], tolerance)
+    points, lengths = cut_kernels.cut_curves(tables.lens.width, tables.lens.height, *curves)
     return np.split(points, np.cumsum(lengths)[:-1]) if len(lengths) else []
 
 

@@ -1,4 +1,4 @@
-"""The compiled loops that bend shadows with a lens: the ring round a shadow in the image, and its label.
+"""The compiled loops that bend shadows with a lens: the ring round a shadow's image, its box, and curves.
 
 Within its valid radius, the rim, a lens maps the normalised plane one-to-one, so the image of a shadow's border is the
 border of its image: everything here follows that one ring. Coordinates are image coordinates; rings run
@@ -17,7 +17,7 @@ Array = np.ndarray
 LONGEST_CURVE = 4096
 """Points on one straight piece, however much it bends."""
 
-MOST_CHORDS = 24
+MOST_CHORDS = 64
 """On a stretch over which one bound on the bend is used."""
 
 LONGEST_QUARTER = 1024
@@ -28,7 +28,7 @@ CAPACITY = 80_000
 
 
 class Lens(NamedTuple):
-    """A camera as the kernels read it; `lens.lens_of` makes it.
+    """A camera as the kernels read it; `lens.lens_tables` makes it.
 
     Attributes:
         fisheye: OpenCV's fisheye polynomial in the angle; else Brown's, a pinhole's being all zeros.
@@ -115,6 +115,15 @@ def polygon_bend(lens: Lens, bends: Array, bound: int, xy: Array, n: int) -> flo
 
 
 @njit(error_model="numpy")
+def within_disc(xy: Array, n: int, radius: float) -> bool:
+    """Whether all corners of a polygon lie in a disc round the origin."""
+    for i in range(n):
+        if not xy[i, 0] * xy[i, 0] + xy[i, 1] * xy[i, 1] < radius * radius:
+            return False
+    return True
+
+
+@njit(error_model="numpy")
 def append_curve(
     lens: Lens,
     bends: Array,
@@ -145,6 +154,38 @@ def append_curve(
 def far_tolerance(distance: float) -> float:
     """What a curve may be off in addition where it is some pixels away from the image."""
     return distance * min(2e-5 * (1.0 + 1e-4 * distance), 1e-3)
+
+
+@njit(error_model="numpy")
+def append_outside_curve(
+    lens: Lens,
+    bend: float,
+    x0: float,
+    y0: float,
+    x1: float,
+    y1: float,
+    tolerance: float,
+    points: Array,
+    m: int,
+) -> tuple[int, float]:
+    """The same where the whole piece is seen to lie on one side of the image: a quarter of the chords do, with the area
+    between them and the curve, by Simpson's rule. Elsewhere nothing is appended. `points` holds the start already."""
+    u0, v0 = points[m - 1, 0], points[m - 1, 1]
+    u1, v1 = image_point(lens, x1, y1)
+    sagitta = bend * ((x1 - x0) ** 2 + (y1 - y0) ** 2) / 8.0
+    # Along its chord a curve bends three times as much as across, at most.
+    beyond_u = max(-max(u0, u1), min(u0, u1) - lens.width) > 3.0 * sagitta
+    beyond_v = max(-max(v0, v1), min(v0, v1) - lens.height) > 3.0 * sagitta
+    if not (beyond_u or beyond_v) or sagitta > MOST_CHORDS * MOST_CHORDS * tolerance:
+        return m, 0.0
+    n = max(2 * math.ceil(math.sqrt(sagitta / tolerance) / 8.0), 2)
+    sample(lens, x0, y0, (x1 - x0) / n, (y1 - y0) / n, n - 1, points[m:])
+    points[m + n - 1, 0], points[m + n - 1, 1] = u1, v1
+    missed = 0.0
+    for i in range(m, m + n, 2):
+        du, dv = points[i, 0] - points[i - 1, 0], points[i, 1] - points[i - 1, 1]
+        missed += (du * (points[i + 1, 1] - points[i - 1, 1]) - dv * (points[i + 1, 0] - points[i - 1, 0])) / 6.0
+    return m + n, missed
 
 
 @njit(error_model="numpy")
@@ -204,9 +245,11 @@ def append_arc(lens: Lens, start: float, sweep: float, tolerance: float, points:
         angle = start - done
         stretch = min(angle - quarter * (math.ceil(angle / quarter - 1e-9) - 1.0), sweep - done)
         n = max(math.ceil(stretch * density), 1)
-        for i in range(1, n + 1):
-            a = angle - stretch * i / n
-            points[m, 0], points[m, 1] = image_point(lens, lens.rim * math.cos(a), lens.rim * math.sin(a))
+        x, y = lens.rim * math.cos(angle), lens.rim * math.sin(angle)
+        c, s = math.cos(stretch / n), math.sin(stretch / n)
+        for _ in range(n):
+            x, y = c * x + s * y, c * y - s * x
+            points[m, 0], points[m, 1] = image_point(lens, x, y)
             m += 1
         done += max(stretch, 1e-9)
     return m
@@ -230,15 +273,17 @@ def within_rim(lens: Lens, x0: float, y0: float, x1: float, y1: float) -> tuple[
 
 
 @njit(error_model="numpy")
-def outline_ring(lens: Lens, bends: Array, xy: Array, n: int, tolerance: float, points: Array) -> int:
-    """The image of a convex polygon cut to the rim, as a ring written to `points`; how many, 0 for none."""
-    m, bend = 0, polygon_bend(lens, bends, 0, xy, n)
+def outline_ring(lens: Lens, bends: Array, xy: Array, n: int, tolerance: float, points: Array) -> tuple[int, float]:
+    """The image of a convex polygon cut to the rim, as a ring written to `points`; how many, 0 for none, and how much
+    more area there is within the true outline than within the ring."""
+    m, bend, missed = 0, polygon_bend(lens, bends, 0, xy, n), 0.0
+    whole = within_disc(xy, n, lens.rim)
     last_x, last_y, last_cut = 0.0, 0.0, False
     first_x, first_y, first_cut = 0.0, 0.0, False
     for i in range(n):
         j = i + 1 if i + 1 < n else 0
         x0, y0, x1, y1 = xy[i, 0], xy[i, 1], xy[j, 0], xy[j, 1]
-        low, high = within_rim(lens, x0, y0, x1, y1)
+        low, high = (0.0, 1.0) if whole else within_rim(lens, x0, y0, x1, y1)
         if low > high:
             continue
         xs, ys = x0 + low * (x1 - x0), y0 + low * (y1 - y0)
@@ -249,13 +294,18 @@ def outline_ring(lens: Lens, bends: Array, xy: Array, n: int, tolerance: float, 
             m = 1
         elif low > 0.0 or last_cut:
             m = append_arc_between(lens, last_x, last_y, xs, ys, tolerance, points, m)
-        m = append_curve(lens, bends, bend, xs, ys, xe, ye, tolerance, points, m)
+        before = m
+        if whole:
+            m, more = append_outside_curve(lens, bend, xs, ys, xe, ye, tolerance, points, m)
+            missed += more
+        if m == before:
+            m = append_curve(lens, bends, bend, xs, ys, xe, ye, tolerance, points, m)
         last_x, last_y, last_cut = xe, ye, high < 1.0
     if m == 0:
-        return append_arc(lens, 0.0, 2.0 * math.pi, tolerance, points, 0) if holds(xy, n, 0.0, 0.0) else 0
+        return (append_arc(lens, 0.0, 2.0 * math.pi, tolerance, points, 0), 0.0) if holds(xy, n, 0.0, 0.0) else (0, 0.0)
     if first_cut or last_cut:
         m = append_arc_between(lens, last_x, last_y, first_x, first_y, tolerance, points, m)
-    return m - 1  # the last point is the first again
+    return m - 1, missed  # the last point is the first again
 
 
 @njit(error_model="numpy")
@@ -284,57 +334,6 @@ def holds(xy: Array, n: int, x: float, y: float) -> bool:
 
 
 @njit(error_model="numpy", forceinline=True)
-def in_image(lens: Lens, u0: float, v0: float, u1: float, v1: float) -> tuple[float, float]:
-    """The part (from, to) of a straight piece, in [0, 1], that lies in the image; (1, 0) where none does."""
-    low, high = 0.0, 1.0
-    for axis in range(2):
-        start, along, side = (u0, u1 - u0, lens.width) if axis == 0 else (v0, v1 - v0, lens.height)
-        if along == 0.0:
-            if not 0.0 <= start <= side:
-                return 1.0, 0.0
-        else:
-            a, b = -start / along, (side - start) / along
-            low, high = max(low, min(a, b)), min(high, max(a, b))
-    return (low, high) if low <= high else (1.0, 0.0)
-
-
-@njit(error_model="numpy", forceinline=True)
-def clamped_integral(v: float, height: float) -> float:
-    """Integral of min(max(v, 0), height) from 0 to v."""
-    return 0.0 if v <= 0.0 else (0.5 * v * v if v <= height else height * (v - 0.5 * height))
-
-
-@njit(error_model="numpy", forceinline=True)
-def area_in_image(lens: Lens, u0: float, v0: float, u1: float, v1: float) -> float:
-    """What one side of a ring adds to the area of the ring within the image: the integral of v, clamped to the
-    image's height, over the part of u within its width. Its sum over any ring is the signed area."""
-    if u0 == u1 or (u0 <= 0.0 and u1 <= 0.0) or (u0 >= lens.width and u1 >= lens.width):
-        return 0.0
-    if v0 >= lens.height and v1 >= lens.height:
-        return lens.height * (min(max(u1, 0.0), lens.width) - min(max(u0, 0.0), lens.width))
-    slope = (v1 - v0) / (u1 - u0)
-    ua, ub = min(max(u0, 0.0), lens.width), min(max(u1, 0.0), lens.width)
-    va, vb = v0 + slope * (ua - u0), v0 + slope * (ub - u0)
-    if 0.0 <= va <= lens.height and 0.0 <= vb <= lens.height:
-        return 0.5 * (va + vb) * (ub - ua)
-    if abs(vb - va) < 1e-9:
-        return min(max(va, 0.0), lens.height) * (ub - ua)
-    return (clamped_integral(vb, lens.height) - clamped_integral(va, lens.height)) / (vb - va) * (ub - ua)
-
-
-@njit(error_model="numpy", forceinline=True)
-def place_in_image(lens: Lens, u: float, v: float) -> tuple[float, float]:
-    """A point of the image without what rounding put beyond its borders."""
-    return min(max(u, 0.0), lens.width), min(max(v, 0.0), lens.height)
-
-
-@njit(error_model="numpy", forceinline=True)
-def start_bbox(bbox: Array) -> None:
-    """A box of nothing."""
-    bbox[0], bbox[1], bbox[2], bbox[3] = np.inf, np.inf, -np.inf, -np.inf
-
-
-@njit(error_model="numpy", forceinline=True)
 def grow_bbox(bbox: Array, u: float, v: float) -> None:
     """Make a box hold a point."""
     bbox[0], bbox[1] = min(bbox[0], u), min(bbox[1], v)
@@ -348,10 +347,10 @@ def amodal_bbox(lens: Lens, bends: Array, xy: Array, n: int, tolerance: float, p
     Along a piece with ends du apart and a sagitta s, u goes beyond its ends by at most s (1 - |du| / 4s)^2, and not
     at all where |du| >= 4 s.
     """
-    start_bbox(bbox)
+    bbox[0], bbox[1], bbox[2], bbox[3] = np.inf, np.inf, -np.inf, -np.inf
+    if not within_disc(xy, n, lens.rim):
+        return False
     for i in range(n):
-        if not xy[i, 0] * xy[i, 0] + xy[i, 1] * xy[i, 1] < lens.rim * lens.rim:
-            return False
         u, v = image_point(lens, xy[i, 0], xy[i, 1])
         points[i, 0], points[i, 1] = u, v
         grow_bbox(bbox, u, v)
@@ -375,93 +374,48 @@ def amodal_bbox(lens: Lens, bends: Array, xy: Array, n: int, tolerance: float, p
     return True
 
 
-@njit(error_model="numpy")
-def label_of_ring(lens: Lens, image_corners: Array, xy: Array, n: int, points: Array, m: int, bbox: Array) -> float:
-    """The box of the part of a ring's inside that lies in the image, written to `bbox`, and the share of its area
-    that does not. `xy` is the polygon whose image the ring is; image corners that it holds are corners of the part."""
-    start_bbox(bbox)
-    width, height = lens.width, lens.height
-    whole, part = 0.0, 0.0
-    u0, v0 = points[m - 1, 0], points[m - 1, 1]
-    inside_before = 0.0 <= u0 <= width and 0.0 <= v0 <= height
-    for i in range(m):
-        u1, v1 = points[i, 0], points[i, 1]
-        area = 0.5 * (v0 + v1) * (u1 - u0)
-        whole += area
-        inside = 0.0 <= u1 <= width and 0.0 <= v1 <= height
-        if inside and inside_before:
-            part += area
-            grow_bbox(bbox, u1, v1)
-        elif not ((u0 <= 0.0 and u1 <= 0.0) or (u0 >= width and u1 >= width) or (v0 <= 0.0 and v1 <= 0.0)):
-            part += area_in_image(lens, u0, v0, u1, v1)
-            low, high = in_image(lens, u0, v0, u1, v1)
-            if low <= high:
-                grow_bbox(bbox, u0 + low * (u1 - u0), v0 + low * (v1 - v0))
-                grow_bbox(bbox, u0 + high * (u1 - u0), v0 + high * (v1 - v0))
-        u0, v0, inside_before = u1, v1, inside
-    for i in range(4):
-        if holds(xy, n, image_corners[i, 0], image_corners[i, 1]):
-            grow_bbox(bbox, lens.width * (i % 2), lens.height * (i // 2))
-    bbox[0], bbox[1] = max(bbox[0], 0.0), max(bbox[1], 0.0)
-    bbox[2], bbox[3] = min(bbox[2], lens.width), min(bbox[3], lens.height)
-    if not (bbox[0] < bbox[2] and bbox[1] < bbox[3]):
-        bbox[:] = np.nan
-        return 1.0
-    return min(max(1.0 - part / whole, 0.0), 1.0) if whole != 0.0 else 0.0
-
-
 @njit(cache=True, nogil=True, error_model="numpy")
-def label_shadows(
+def boxes_of_shadows(
     lens: Lens,
     bends: Array,
-    image_corners: Array,
     polygons: Array,
     corners: Array,
     tolerance: float,
     bbox: Array,
     bbox_amodal: Array,
     truncated: Array,
+    unsettled: Array,
 ) -> None:
-    """Labels of n x b shadows, written to `bbox` and `bbox_amodal` (n, b, 4) and `truncated` (n, b).
-
-    `image_corners` (4, 2): the image's corners (0, 0), (W, 0), (0, H), (W, H) in the normalised plane, NaN where no
-    ray of the lens ends in one.
-    """
-    # Copies, because threads that count the users of one array stand in each other's way.
-    bends, image_corners, points = bends.copy(), image_corners.copy(), np.empty((CAPACITY, 2))
+    """Labels, as far as boxes settle them, of n x b shadows, written to `bbox` and `bbox_amodal` (n, b, 4) and
+    `truncated` (n, b); those that need their rings are marked in `unsettled` (n, b), and those of them that the rim
+    cuts have no `bbox_amodal` yet."""
+    # A copy, because threads that count the users of one array stand in each other's way.
+    bends, points = bends.copy(), np.empty((CAPACITY, 2))
     for frame in range(corners.shape[0]):
         for box in range(corners.shape[1]):
-            part, whole = bbox[frame, box], bbox_amodal[frame, box]
-            part[:], whole[:], truncated[frame, box] = np.nan, np.nan, 1.0
-            xy, n = polygons[frame, box], corners[frame, box]
-            if n == 0:
-                continue
-            if amodal_bbox(lens, bends, xy, n, tolerance, points, whole):
-                if whole[0] >= lens.width or whole[1] >= lens.height or whole[2] <= 0.0 or whole[3] <= 0.0:
-                    continue
-                if whole[0] >= 0.0 and whole[1] >= 0.0 and whole[2] <= lens.width and whole[3] <= lens.height:
-                    if whole[0] < whole[2] and whole[1] < whole[3]:
-                        part[:], truncated[frame, box] = whole, 0.0
-                    continue
-            m = outline_ring(lens, bends, xy, n, tolerance, points)
-            if m < 3:
+            xy, n, whole = polygons[frame, box], corners[frame, box], bbox_amodal[frame, box]
+            bbox[frame, box, :], truncated[frame, box], unsettled[frame, box] = np.nan, 1.0, n > 0
+            if n == 0 or not amodal_bbox(lens, bends, xy, n, tolerance, points, whole):
                 whole[:] = np.nan
-                continue
-            start_bbox(whole)
-            for i in range(m):
-                grow_bbox(whole, points[i, 0], points[i, 1])
-            truncated[frame, box] = label_of_ring(lens, image_corners, xy, n, points, m, part)
+            elif whole[0] >= lens.width or whole[1] >= lens.height or whole[2] <= 0.0 or whole[3] <= 0.0:
+                unsettled[frame, box] = False
+            elif whole[0] >= 0.0 and whole[1] >= 0.0 and whole[2] <= lens.width and whole[3] <= lens.height:
+                unsettled[frame, box] = False
+                if whole[0] < whole[2] and whole[1] < whole[3]:
+                    bbox[frame, box, :] = whole
+                    truncated[frame, box] = 0.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def rings_of_shadows(
     lens: Lens, bends: Array, polygons: Array, corners: Array, wanted: Array, tolerance: float
-) -> tuple[Array, Array]:
-    """Rings round n x b shadows, those that are `wanted` (n, b): all points (k, 2), and (n * b,) how many each has."""
+) -> tuple[Array, Array, Array]:
+    """Rings round n x b shadows, those that are `wanted` (n, b): all points (k, 2), (n * b,) how many each has, and
+    (n * b,) how much area they missed."""
     # A copy, because threads that count the users of one array stand in each other's way.
     bends = bends.copy()
     frames, boxes = corners.shape
-    lengths = np.zeros(frames * boxes, np.int64)
+    lengths, missed = np.zeros(frames * boxes, np.int64), np.zeros(frames * boxes)
     ring = np.empty((CAPACITY, 2))
     found = np.empty((64 * frames * boxes, 2))
     k = 0
@@ -469,49 +423,34 @@ def rings_of_shadows(
         for box in range(boxes):
             if not wanted[frame, box] or corners[frame, box] == 0:
                 continue
-            m = outline_ring(lens, bends, polygons[frame, box], corners[frame, box], tolerance, ring)
+            xy, row = polygons[frame, box], frame * boxes + box
+            m, missed[row] = outline_ring(lens, bends, xy, corners[frame, box], tolerance, ring)
             if k + m > len(found):
                 grown = np.empty((2 * len(found) + m, 2))
                 grown[:k] = found[:k]
                 found = grown
             found[k : k + m] = ring[:m]
-            lengths[frame * boxes + box] = m
+            lengths[row] = m
             k += m
-    return found[:k].copy(), lengths
+    return found[:k].copy(), lengths, missed
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def curves_of_edges(lens: Lens, bends: Array, edges: Array, tolerance: float) -> tuple[Array, Array]:
-    """Images of straight pieces (n, 2, 2), cut to the rim and the image: all points (k, 2), and how many each curve
-    has; a piece gives no curve, one, or more where the lens bends it out of the image and back."""
+    """Images of straight pieces (n, 2, 2), cut to the rim: all points (k, 2), and (n,) how many each has, 0 for those
+    beyond the rim."""
     bend = polygon_bend(lens, bends, 0, edges.reshape((-1, 2)), 2 * len(edges))
-    curve = np.empty((CAPACITY, 2))
-    found = np.empty((2 * CAPACITY, 2))
-    lengths = np.zeros(2 * CAPACITY, np.int64)
-    k, curves = 0, 0
-    for edge in range(len(edges)):
-        x0, y0, x1, y1 = edges[edge, 0, 0], edges[edge, 0, 1], edges[edge, 1, 0], edges[edge, 1, 1]
+    found = np.empty((CAPACITY, 2))
+    lengths = np.zeros(len(edges), np.int64)
+    k = 0
+    for i in range(len(edges)):
+        x0, y0, x1, y1 = edges[i, 0, 0], edges[i, 0, 1], edges[i, 1, 0], edges[i, 1, 1]
         low, high = within_rim(lens, x0, y0, x1, y1)
         if low > high:
             continue
         xs, ys, xe, ye = x0 + low * (x1 - x0), y0 + low * (y1 - y0), x0 + high * (x1 - x0), y0 + high * (y1 - y0)
-        curve[0, 0], curve[0, 1] = image_point(lens, xs, ys)
-        m = append_curve(lens, bends, bend, xs, ys, xe, ye, tolerance, curve, 1)
-        joined = False
-        for i in range(m - 1):
-            u, v = curve[i, 0], curve[i, 1]
-            du, dv = curve[i + 1, 0] - u, curve[i + 1, 1] - v
-            start, end = in_image(lens, u, v, u + du, v + dv)
-            if start >= end:
-                joined = False
-                continue
-            if not joined or start > 0.0:
-                found[k, 0], found[k, 1] = place_in_image(lens, u + start * du, v + start * dv)
-                lengths[curves] = 1
-                curves += 1
-                k += 1
-            found[k, 0], found[k, 1] = place_in_image(lens, u + end * du, v + end * dv)
-            lengths[curves - 1] += 1
-            k += 1
-            joined = end == 1.0
-    return found[:k].copy(), lengths[:curves].copy()
+        found[k, 0], found[k, 1] = image_point(lens, xs, ys)
+        end = append_curve(lens, bends, bend, xs, ys, xe, ye, tolerance, found, k + 1)
+        lengths[i] = end - k
+        k = end
+    return found[:k].copy(), lengths

@@ -20,7 +20,9 @@ ROUNDING = 1e-14
 """R^T R of a rotation that is as exact as float64 can hold is off the identity by less."""
 
 
-def from_rotation(rotation: Float[np.ndarray, "*batch 3 3"], translation: Float[np.ndarray, "*batch 3"]) -> Transforms:
+def from_rotation(
+    rotation: Float[np.ndarray, "*#batch 3 3"], translation: Float[np.ndarray, "*#batch 3"]
+) -> Float[np.ndarray, "... 4 4"]:
     """Transforms from rotation matrices (..., 3, 3) and translations (..., 3), which must broadcast."""
     batch = np.broadcast_shapes(rotation.shape[:-2], translation.shape[:-1])
     T = np.zeros((*batch, 4, 4))
@@ -93,7 +95,9 @@ def invert(T: Transforms) -> Transforms:
     return from_rotation(R_inv, -(R_inv @ T[..., :3, 3:])[..., 0])
 
 
-def transform_points(T_a_b: Transforms, points_b: Float[np.ndarray, "*batch n 3"]) -> Float[np.ndarray, "*batch n 3"]:
+def transform_points(
+    T_a_b: Float[np.ndarray, "*#batch 4 4"], points_b: Float[np.ndarray, "*#batch n 3"]
+) -> Float[np.ndarray, "... n 3"]:
     """Points (..., n, 3) in frame b as points in frame a; batches broadcast."""
     return points_b @ np.swapaxes(T_a_b[..., :3, :3], -1, -2) + T_a_b[..., None, :3, 3]
 
