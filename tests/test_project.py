@@ -25,10 +25,10 @@ NOT_OURS = {".git", ".venv", ".hypothesis", "build", "dist", "demo-output", "nod
 """Folders at the root that hold what tools or users put there."""
 
 FOREIGN_TRACES = re.compile(
-    r"pypi\.org|pythonhosted|npmjs|deb\.debian|debian\.org/debian|index-url|"
+    r"(?:extra-)?index-url|find-links|https?://[^/\s]*(?:pypi|npm|registry|mirror|deb\.)[^/\s]*|"
     r"(?<![\w.])/(?:root|home/(?!ars\b)\w+|Users/\w+|work)/"
 )
-"""Package indexes, and paths that exist on one machine only."""
+"""Addresses of package indexes, and paths that exist on one machine only."""
 
 
 def own_files(*suffixes: str) -> Iterator[Path]:
