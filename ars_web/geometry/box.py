@@ -8,8 +8,6 @@ from itertools import product
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.optimize import linprog
-from scipy.spatial import ConvexHull, HalfspaceIntersection
 
 from ars_web.errors import BadInput
 from ars_web.geometry import rigid_transform
@@ -81,6 +79,9 @@ def iou(a: Box, b: Box) -> float:
     The twelve face half-spaces are intersected (Qhull) round a point found by the linear programme for the
     largest inscribed ball.
     """
+    # SciPy takes half a second to load, which commands and workers that never compare boxes need not wait for.
+    from scipy.spatial import ConvexHull, HalfspaceIntersection
+
     halfspaces = np.concatenate([_halfspaces(a), _halfspaces(b)])
     centre, radius = _inscribed_ball(halfspaces)
     if radius <= 1e-9 * float(min(a.size.min(), b.size.min())):
@@ -100,6 +101,8 @@ def _halfspaces(box: Box) -> Float[np.ndarray, "6 4"]:
 
 def _inscribed_ball(halfspaces: Float[np.ndarray, "n 4"]) -> tuple[Float[np.ndarray, "3"], float]:
     """Centre and radius of the largest ball within the half-spaces; the radius is -1 where there is none."""
+    from scipy.optimize import linprog
+
     # maximise r subject to n . c + r <= -d: the Chebyshev centre (Boyd and Vandenberghe, 8.5.1)
     A = np.column_stack([halfspaces[:, :3], np.ones(len(halfspaces))])
     found = linprog([0, 0, 0, -1], A_ub=A, b_ub=-halfspaces[:, 3], bounds=[(None, None)] * 3 + [(0, None)])
