@@ -49,10 +49,10 @@ def place_image(source: str, target: str, *, camera: Camera, stamp: tuple[int, i
     encoding, and where its Exif asks viewers to turn it: the labels are for the pixels as they are stored.
 
     Raises:
-        BadFile: the source is missing, damaged, changed, or not of its camera's size.
+        BadFile: the source is missing, damaged, changed, a link, or not of its camera's size.
         OSError: the target cannot be written.
     """
-    source = _checked(source, stamp)
+    _check_unchanged(source, stamp)
     header = read_header(Path(source))
     if not header.whole:
         raise BadFile(source, "the image ends before its data does (truncated)")
@@ -91,19 +91,27 @@ def _rectifying_maps(camera: Camera) -> tuple[np.ndarray, np.ndarray]:
     return whole, fraction
 
 
-def _checked(source: str, stamp: tuple[int, int]) -> str:
-    """The source, or the file it is a link to; BadFile where it is missing or not what was planned with."""
+def source_stamp(source: str) -> tuple[int, int]:
+    """The size in bytes and the time of change in ns of an image that is to be exported.
+
+    Sessions keep paths without links, so a link is what someone put in the image's place. Besides, a hard link to it
+    would be a link, out of the dataset.
+
+    Raises:
+        BadFile: it is missing, or has become a link.
+    """
     try:
         status = os.lstat(source)
-        if stat.S_ISLNK(status.st_mode):
-            # A hard link to a symbolic link would be a symbolic link, out of the dataset.
-            source = os.path.realpath(source)
-            status = os.stat(source)  # noqa: PTH116 - the path is a str throughout, for speed
     except OSError as error:
         raise BadFile(source, f"the image cannot be exported: {error.strerror}") from error
-    if (status.st_size, status.st_mtime_ns) != stamp:
+    if stat.S_ISLNK(status.st_mode):
+        raise BadFile(source, "the image has become a link since it was imported; import the recording again")
+    return status.st_size, status.st_mtime_ns
+
+
+def _check_unchanged(source: str, stamp: tuple[int, int]) -> None:
+    if source_stamp(source) != stamp:
         raise BadFile(source, "the image changed since the export was planned; start the export again")
-    return source
 
 
 def _same_encoding(source: str, target: str) -> bool:

@@ -15,10 +15,11 @@ from jaxtyping import Float, Int
 
 from ars_web.datasets import splits
 from ars_web.datasets.file_names import stems
+from ars_web.datasets.images import source_stamp
 from ars_web.datasets.options import ExportOptions, FrameChoice
 from ars_web.datasets.registry import writer_of
 from ars_web.datasets.samples import check_shape
-from ars_web.errors import BadFile, BadInput
+from ars_web.errors import BadInput
 from ars_web.geometry.box import Box
 from ars_web.geometry.camera import Camera
 from ars_web.sessions.model import SessionSnapshot
@@ -121,7 +122,7 @@ def plan_export(
     Raises:
         BadInput: the format or the shape is unknown or cannot be made, `out` is in use, a frame or a session is
             chosen that is not there, or no frame at all.
-        BadFile: a source image is missing.
+        BadFile: a source image is missing, or has become a link.
     """
     writer = writer_of(format)
     check_shape(options.shape)
@@ -221,11 +222,7 @@ def _planned_session(snapshot: SessionSnapshot, class_names: tuple[str, ...]) ->
 def _stamps(sources: Sequence[str]) -> Int[np.ndarray, "n 2"]:
     stamps = np.zeros((len(sources), 2), dtype=np.int64)
     for row, source in enumerate(sources):
-        try:
-            status = os.stat(source)  # noqa: PTH116 - a third of the cost, and this runs once an image
-        except OSError as error:
-            raise BadFile(source, f"the image cannot be exported: {error.strerror}") from error
-        stamps[row] = status.st_size, status.st_mtime_ns
+        stamps[row] = source_stamp(source)
     return stamps
 
 

@@ -79,12 +79,13 @@ def test_a_full_disk_is_not_taken_for_a_missing_link(tmp_path: Path, monkeypatch
         place(path, tmp_path / "b.jpg")
 
 
-def test_a_link_to_an_image_becomes_the_image(tmp_path: Path) -> None:
-    path = source(tmp_path / "a.jpg", picture(FLAT))
-    (tmp_path / "alias.jpg").symlink_to("a.jpg")
-    found = place(str(tmp_path / "alias.jpg"), tmp_path / "b.jpg")
-    assert not found.is_symlink()
-    assert found.samefile(path)
+@pytest.mark.parametrize("images", ["link", "copy", "rectify"])
+def test_a_link_that_took_the_place_of_an_image_is_refused(tmp_path: Path, images: str) -> None:
+    secret = source(tmp_path / "secret.jpg", picture(FLAT))
+    (tmp_path / "a.jpg").symlink_to("secret.jpg")
+    with pytest.raises(BadFile, match=r"a\.jpg: the image has become a link since it was imported"):
+        place_image(str(tmp_path / "a.jpg"), str(tmp_path / "b.jpg"), camera=FLAT, stamp=stamp(secret), images=images)
+    assert not (tmp_path / "b.jpg").exists()
 
 
 def test_a_png_becomes_a_jpeg_where_the_format_has_no_other(tmp_path: Path) -> None:

@@ -108,6 +108,15 @@ def test_a_missing_image_is_named_before_any_work(make_snapshot: Make, tmp_path:
     assert len(plan_of(snapshot, out=tmp_path / "d", images="none").frames) == 4
 
 
+def test_an_image_that_became_a_link_is_named_before_any_work(make_snapshot: Make, tmp_path: Path) -> None:
+    snapshot = make_snapshot(4)
+    image = snapshot.frames.images[2]
+    image.rename(tmp_path / "moved.jpg")
+    image.symlink_to(tmp_path / "moved.jpg")
+    with pytest.raises(BadFile, match=r"0002\.jpg: the image has become a link"):
+        plan_of(snapshot, out=tmp_path / "d")
+
+
 def test_folders_in_use_are_refused(make_snapshot: Make, tmp_path: Path) -> None:
     snapshot = make_snapshot(1)
     used = tmp_path / "used"
