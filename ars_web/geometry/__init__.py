@@ -23,4 +23,9 @@ Labels
     `bbox_amodal` is the whole object's box, unclipped; `bbox` is the box of the part of the object that lies
     in the image. `truncated` is the share of the amodal outline's area outside the image; `visible` the share
     of the in-image outline that no nearer object hides.
+
+Speed
+    Modules named `*_kernels.py` hold numba's compiled loops over frames and boxes, and nothing else; the module beside
+    them says what they are for. Nothing is compiled on import, and what is compiled is kept on disk. Long rows of
+    frames go over threads in blocks (`frame_blocks.py`); `numba.set_num_threads` limits them.
 """

@@ -1,5 +1,7 @@
 """Labels against the slow oracle, by hand where a hand can, and by what must hold in any scene."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -182,6 +184,18 @@ def test_arrays_that_may_only_be_read_or_lie_otherwise_are_labelled_alike():
     Ts.flags.writeable = False
     found = labels_of_boxes(BROWN, Ts, boxes)
     np.testing.assert_array_equal(found.bbox[1], labels_of_boxes(BROWN, IDENTITY[None], boxes).bbox[0])
+
+
+def test_several_threads_may_ask_at_once(random_scene):
+    scenes = [random_scene(seed) for seed in range(8)]
+    Ts = [np.repeat(T[None], 900, axis=0) for _, T, _ in scenes]
+    alone = [labels_of_boxes(scene[0], T, [scene[2]] * 10).bbox for scene, T in zip(scenes, Ts, strict=True)]
+    with ThreadPoolExecutor(8) as pool:
+        asked = [
+            pool.submit(labels_of_boxes, scene[0], T, [scene[2]] * 10) for scene, T in zip(scenes, Ts, strict=True)
+        ]
+        for want, found in zip(alone, asked, strict=True):
+            np.testing.assert_array_equal(found.result().bbox, want)
 
 
 # What holds in any scene
