@@ -27,12 +27,14 @@ class ArchiveLimits:
         ratio: unpacked bytes to the bytes of the archive itself. Images hardly shrink and text shrinks tenfold; a
             bomb is a thousandfold.
         name_bytes: of one member's path, in UTF-8.
+        part_bytes: of each folder's and file's name in that path; file systems take no more.
     """
 
     bytes: int = 64 << 30
     members: int = 200_000
     ratio: float = 100.0
     name_bytes: int = 512
+    part_bytes: int = 255
 
 
 DEFAULT_LIMITS = ArchiveLimits()
@@ -57,7 +59,7 @@ def extract_zip(source: Path, target: Path, *, limits: ArchiveLimits = DEFAULT_L
             partial.mkdir(parents=True)
             _unpack(source, archive, members, partial, limits)
         partial.replace(target)
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError) as error:
+    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, UnicodeDecodeError) as error:
         raise BadFile(source, f"is no zip archive or a damaged one: {error}") from error
     except OSError as error:
         raise _blame(error, source, target) from error
@@ -70,6 +72,9 @@ def _checked_members(source: Path, archive: zipfile.ZipFile, limits: ArchiveLimi
     members = archive.infolist()
     if len(members) > limits.members:
         raise TooLarge(f"{source}: holds {len(members)} members; at most {limits.members} are taken")
+    length = source.stat().st_size
+    if not all(0 <= member.header_offset < length for member in members):
+        raise BadFile(source, "is a damaged zip archive: a member is said to lie outside it")
     kinds: dict[str, bool] = {}
     for member in members:
         name = _checked_name(source, member, limits)
@@ -103,6 +108,8 @@ def _checked_name(source: Path, member: zipfile.ZipInfo, limits: ArchiveLimits) 
         raise RefusedPath(f"{source}: a member's name holds a control character: {name!r}")
     if len(name.encode()) > limits.name_bytes:
         raise TooLarge(f"{source}: a member's name is longer than {limits.name_bytes} bytes: {name[:60]!r}…")
+    if any(len(part.encode()) > limits.part_bytes for part in parts):
+        raise TooLarge(f"{source}: a file or folder has a name over {limits.part_bytes} bytes: {name[:60]!r}…")
     kind = stat.S_IFMT(member.external_attr >> 16)
     if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
         raise RefusedPath(f"{source}: {name!r} is a link or a device, not a file")

@@ -1,6 +1,7 @@
 """Archives of strangers: unpacked within their folder and their limits, or not at all."""
 
 import stat
+import struct
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -108,6 +109,8 @@ def test_limits_are_kept(pack: Pack):
     assert_refused(many, TooLarge, "holds 11 members; at most 10", members=10)
     assert_refused(pack(("x" * 101, b"")), TooLarge, "longer than 100 bytes", name_bytes=100)
     assert_refused(pack(("ä" * 51, b"")), TooLarge, "longer than 100 bytes", name_bytes=100)
+    for name in ("x" * 256, "ä" * 128 + "/a"):
+        assert_refused(pack((name, b"")), TooLarge, "a name over 255 bytes")
     assert_refused(pack(("a", b"x" * 600), ("b", b"x" * 600)), TooLarge, "more than 1000 bytes", bytes=1000)
 
 
@@ -154,6 +157,34 @@ def test_damage_is_said_to_be_damage(pack: Pack, tmp_path: Path):
     raw = bytearray(source.read_bytes())
     raw[40:44] = b"\xff\xff\xff\xff"
     source.write_bytes(raw)
+    assert_refused(source, BadFile, "damaged")
+
+
+def test_an_archive_that_lost_its_beginning_is_damaged(pack: Pack):
+    source = pack(("a", b"0123456789" * 100), ("b", b"x"))
+    source.write_bytes(source.read_bytes()[200:])
+    assert_refused(source, BadFile, "damaged zip archive: a member is said to lie outside it")
+
+
+def test_a_member_said_to_lie_beyond_any_file_is_damage(pack: Pack):
+    source = pack(("a", b"x"))
+    raw = source.read_bytes()
+    start, end = raw.index(b"PK\1\2"), raw.index(b"PK\5\6")
+    entry, tail = bytearray(raw[start:end]), bytearray(raw[end:])
+    extra = struct.pack("<HHQ", 1, 8, 2**64 - 1)  # ZIP64: where the member's own header is
+    entry[30:32] = struct.pack("<H", len(extra))
+    entry[42:46] = b"\xff" * 4
+    tail[12:16] = struct.pack("<I", len(entry) + len(extra))
+    source.write_bytes(raw[:start] + entry + extra + tail)
+    assert_refused(source, BadFile, "lie outside it")
+
+
+@pytest.mark.parametrize("header", [b"PK\1\2", b"PK\3\4"])
+def test_a_name_that_is_not_the_text_it_says_it_is_is_damage(pack: Pack, header: bytes):
+    source = pack(("ä.txt", b"x"))
+    raw = source.read_bytes()
+    at = raw.index("ä".encode(), raw.index(header))
+    source.write_bytes(raw[:at] + b"\xff\xff" + raw[at + 2 :])
     assert_refused(source, BadFile, "damaged")
 
 
