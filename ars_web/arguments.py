@@ -121,6 +121,18 @@ def comma_separated(text: str | None, option: str) -> list[str]:
     return items
 
 
+def whole_numbers(text: str | None, option: str) -> list[int]:
+    """The items of `text` as numbers, none where it is None.
+
+    Raises:
+        typer.BadParameter: an item is empty or no whole number.
+    """
+    try:
+        return [int(item) for item in comma_separated(text, option)]
+    except ValueError as error:
+        raise typer.BadParameter(f"{text!r} must be whole numbers with commas between", param_hint=option) from error
+
+
 def session_name(recording: Path) -> str:
     """What to call a session where nobody said: after the folder, or the file where its name says something."""
     path = recording.resolve()

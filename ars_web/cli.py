@@ -241,7 +241,7 @@ def export(
             "frames.step": frames_step,
             "frames.start": frames_start,
             "frames.stop": frames_stop,
-            "frames.list": take.comma_separated(frames_list, "--frames-list") or None,
+            "frames.list": take.whole_numbers(frames_list, "--frames-list") or None,
             "images": images,
             "shape": shape,
             "min_visible": min_visible,

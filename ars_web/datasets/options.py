@@ -4,7 +4,9 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-Share = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
+# Strict: a truth value or a string is no number.
+Share = Annotated[float, Field(strict=True, ge=0.0, le=1.0, allow_inf_nan=False)]
+Count = Annotated[int, Field(strict=True, ge=0)]
 
 
 class _Strict(BaseModel):
@@ -14,10 +16,10 @@ class _Strict(BaseModel):
 class FrameChoice(_Strict):
     """Which frames of each session: every `step`-th from `start` up to, not including, `stop`; or those listed."""
 
-    step: int = Field(1, ge=1)
-    start: int = Field(0, ge=0)
-    stop: int | None = Field(None, ge=0)
-    list: tuple[Annotated[int, Field(ge=0)], ...] | None = None
+    step: int = Field(1, strict=True, ge=1)
+    start: Count = 0
+    stop: Count | None = None
+    list: tuple[Count, ...] | None = None
 
 
 class SplitChoice(_Strict):
@@ -31,7 +33,7 @@ class SplitChoice(_Strict):
     val: Share = 0.2
     test: Share = 0.0
     by: Literal["block", "frame", "session"] = "block"
-    seed: int = Field(0, ge=0)
+    seed: Count = 0
 
     @model_validator(mode="after")
     def _shares_add_up(self) -> "SplitChoice":
@@ -58,7 +60,7 @@ class ExportOptions(_Strict):
     min_visible: Share = Field(0.0, description="labels with a smaller visible fraction are dropped")
     max_truncated: Share = Field(1.0, description="labels with a larger share outside the image are dropped")
     min_area_px: float = Field(
-        4.0, ge=0.0, allow_inf_nan=False, description="labels with a smaller in-image box are dropped"
+        4.0, strict=True, ge=0.0, allow_inf_nan=False, description="labels with a smaller in-image box are dropped"
     )
     split: SplitChoice = SplitChoice()  # pyright: ignore[reportCallIssue]
     sessions: tuple[str, ...] = Field((), description="ids of further sessions to merge; classes are matched by name")

@@ -56,6 +56,28 @@ def test_a_sessions_exports_are_listed(client: httpx.Client, labelled: str, unti
     assert [job["id"] for job in client.get(path).json()] == [job["id"] for job in reversed(jobs)]
 
 
+@pytest.mark.parametrize(
+    ("options", "where"),
+    [
+        ({"frames": {"step": True}}, "frames.step"),
+        ({"frames": {"start": "1"}}, "frames.start"),
+        ({"frames": {"stop": 2.0}}, "frames.stop"),
+        ({"frames": {"list": [0, "1"]}}, "frames.list.1"),
+        ({"min_visible": "0.5"}, "min_visible"),
+        ({"max_truncated": True}, "max_truncated"),
+        ({"min_area_px": "4"}, "min_area_px"),
+        ({"split": {"train": True, "val": False}}, "split.train"),
+        ({"split": {"seed": "0"}}, "split.seed"),
+    ],
+)
+def test_an_option_takes_no_other_kind_of_value(
+    client: httpx.Client, sid: str, options: dict[str, Any], where: str
+) -> None:
+    answer = client.post(f"/api/sessions/{sid}/exports", json={"format": "coco", "options": options})
+    assert answer.status_code == 422, answer.text
+    assert answer.json()["errors"][0]["where"] == f"body.options.{where}"
+
+
 def test_a_repeat_with_the_same_key_starts_no_second_export(client: httpx.Client, labelled: str, until) -> None:
     path, key = f"/api/sessions/{labelled}/exports", {"Idempotency-Key": f"export {labelled}"}
     body = {"format": "coco", "options": {"images": "none"}}
