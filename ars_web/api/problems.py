@@ -12,6 +12,7 @@ from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
+from starlette.routing import BaseRoute, Match
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from ars_web.api.models import current_json
@@ -168,13 +169,29 @@ def _precondition_missing(request: Request, error: Exception) -> Response:
 def _http_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     phrase = HTTPStatus(error.status_code).phrase
-    detail = error.detail
+    detail, headers = error.detail, error.headers
     if error.status_code == 404:
         detail = "there is nothing at this address; /api/openapi.json lists what there is"
     elif error.status_code == 405:
-        detail = f"{request.method} is not possible here; possible is {(error.headers or {}).get('Allow', 'nothing')}"
+        headers = {"Allow": ", ".join(_possible_methods(request))}
+        detail = f"{request.method} is not possible here; possible is {headers['Allow']}"
     kind = phrase.lower().replace(" ", "-")
-    return ProblemResponse(error.status_code, kind, phrase, detail, headers=error.headers)
+    return ProblemResponse(error.status_code, kind, phrase, detail, headers=headers)
+
+
+def _possible_methods(request: Request) -> list[str]:
+    """Of all routes at the request's address; the framework names those of the first one alone.
+
+    The page's files have no route of their own and can only be read.
+    """
+    routes: Sequence[BaseRoute] = request.app.routes
+    scope = {**request.scope, "path_params": {}}
+    possible = [
+        method
+        for method in ("DELETE", "GET", "PATCH", "POST", "PUT")
+        if any(route.matches({**scope, "method": method})[0] is Match.FULL for route in routes)
+    ]
+    return possible or ["GET"]
 
 
 class Unexpected:

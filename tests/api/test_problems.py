@@ -44,8 +44,14 @@ def test_a_method_that_is_not_possible(client: httpx.Client) -> None:
     answer = client.put("/api/sessions", json={})
     assert answer.status_code == 405
     assert answer.headers["content-type"] == "application/problem+json"
-    assert "GET" in answer.headers["allow"]
-    assert answer.json()["detail"].startswith("PUT")
+    assert answer.headers["allow"] == "GET, POST"
+    assert answer.json()["detail"] == "PUT is not possible here; possible is GET, POST"
+
+
+def test_every_method_that_is_possible_is_named(client: httpx.Client, sid: str) -> None:
+    assert client.put(f"/api/sessions/{sid}/boxes/1", json={}).headers["allow"] == "DELETE, GET, PATCH"
+    assert client.delete(f"/api/sessions/{sid}/frames").headers["allow"] == "GET"
+    assert client.post("/static/main.js").headers["allow"] == "GET"
 
 
 def test_a_request_that_does_not_fit_names_each_field_and_echoes_nothing(client: httpx.Client, sid: str) -> None:
