@@ -18,7 +18,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import TypeAdapter
+from pydantic import TypeAdapter, ValidationError
 
 from ars_web.datasets.assembly import DOCUMENT
 from ars_web.datasets.jobs import partial_folder, run_export
@@ -27,7 +27,7 @@ from ars_web.datasets.plan import ExportPlan, check_merged, plan_export
 from ars_web.datasets.plan_files import read_digest, read_plan
 from ars_web.datasets.registry import writer_of
 from ars_web.datasets.samples import check_shape
-from ars_web.errors import ArsError, BadInput, Cancelled, NotFound
+from ars_web.errors import ArsError, BadInput, Cancelled, NotFound, StoreError
 from ars_web.sessions.model import SessionSnapshot
 
 _log = logging.getLogger(__name__)
@@ -90,7 +90,12 @@ class ExportJobs:
         self._futures: dict[str, Future[None]] = {}
         self._jobs: dict[str, ExportJob] = {}
         for path in sorted(self._folder.glob("*/job.json")):
-            job = _JSON.validate_json(path.read_bytes())
+            try:
+                job = _JSON.validate_json(path.read_bytes())
+            except (OSError, ValidationError) as error:
+                # One job that cannot be read must not keep the server from starting.
+                _log.warning("%s is left out of the exports: %s", path, error)
+                continue
             self._jobs[job.id] = job
 
     def start(
@@ -103,14 +108,19 @@ class ExportJobs:
     ) -> ExportJob:
         """Ask for an export of a session as it is now; the job, queued.
 
-        A repeat with the same `key` answers the job that the first made.
+        A repeat with the same `key` answers the job that the first made, whatever became of its sessions since.
 
         Raises:
             NotFound: the session, or one merged with it, is not there.
             BadInput: the format or an option cannot be, or `key` was used for another export.
+            StoreError: the job cannot be kept.
         """
         writer_of(format)
         check_shape(options.shape)
+        with self._lock:
+            before = self._made_with(key, sid, format, options)
+        if before is not None:
+            return before
         snapshots = self._snapshots(sid, options)
         job = ExportJob(
             id=f"x{secrets.token_hex(6)}",
@@ -126,13 +136,19 @@ class ExportJobs:
             created=datetime.now(UTC),
         )
         with self._lock:
-            first = next((other for other in self._jobs.values() if key is not None and other.key == key), job)
-            if (first.session_id, first.format, first.options) != (sid, format, options):
-                raise BadInput(f"Idempotency-Key {key!r} was used for another export; use a new one")
-            if first is job:
-                self._keep(job)
-                self._jobs[job.id] = job
-                self._futures[job.id] = self._runner.submit(self._run, job.id, snapshots)
+            before = self._made_with(key, sid, format, options)
+            if before is not None:
+                return before
+            self._keep(job)
+            self._jobs[job.id] = job
+            self._futures[job.id] = self._runner.submit(self._run, job.id, snapshots)
+        return job
+
+    def _made_with(self, key: str | None, sid: str, kind: str, options: ExportOptions) -> ExportJob | None:
+        """The job that `key` made; None where it made none. The caller holds the lock."""
+        first = next((job for job in self._jobs.values() if key is not None and job.key == key), None)
+        if first is not None and (first.session_id, first.format, first.options) != (sid, kind, options):
+            raise BadInput(f"Idempotency-Key {key!r} was used for another export; use a new one")
         return first
 
     def get(self, job_id: str) -> ExportJob:
@@ -262,15 +278,18 @@ class ExportJobs:
             return True
 
     def _keep(self, job: ExportJob) -> None:
-        """Put a job on the disk, whole. The caller holds the lock."""
+        """Put a job on the disk, whole; StoreError where that cannot be. The caller holds the lock."""
         folder = self._folder / job.id
-        folder.mkdir(parents=True, exist_ok=True)
-        beside = folder / "job.json.new"
-        with beside.open("wb") as file:
-            file.write(_JSON.dump_json(job))
-            file.flush()
-            os.fsync(file.fileno())
-        beside.replace(folder / "job.json")
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            beside = folder / "job.json.new"
+            with beside.open("wb") as file:
+                file.write(_JSON.dump_json(job))
+                file.flush()
+                os.fsync(file.fileno())
+            beside.replace(folder / "job.json")
+        except OSError as error:
+            raise StoreError(f"{error.filename or folder}: the export cannot be kept: {error.strerror}") from error
 
     def _out(self, job_id: str) -> Path:
         return self._folder / job_id / "dataset"

@@ -13,7 +13,7 @@ import pytest
 from ars_web.datasets.exports import ExportJobs
 from ars_web.datasets.jobs import partial_folder, plan_export, run_export
 from ars_web.datasets.options import ExportOptions
-from ars_web.errors import BadInput, NotFound
+from ars_web.errors import BadInput, NotFound, StoreError
 from ars_web.sessions.model import SessionSnapshot
 
 Make = Callable[..., SessionSnapshot]
@@ -208,3 +208,33 @@ def test_a_job_whose_server_died_after_publishing_is_done(make_snapshot: Make, t
     with jobs_of(tmp_path / "sessions", snapshot) as jobs:
         jobs.resume_unfinished()
         assert jobs.wait(job.id, timeout=60) == job
+
+
+def test_a_key_answers_its_job_when_the_session_is_gone(make_snapshot: Make, tmp_path: Path) -> None:
+    with jobs_of(tmp_path / "sessions", make_snapshot(2)) as jobs:
+        first = jobs.start("s1", format="yolo", options=PLAIN, key="k")
+        jobs.wait(first.id, timeout=60)
+    with jobs_of(tmp_path / "sessions") as jobs:
+        assert jobs.start("s1", format="yolo", options=PLAIN, key="k").id == first.id
+        with pytest.raises(NotFound):
+            jobs.start("s1", format="yolo", options=PLAIN, key="another")
+
+
+@pytest.mark.parametrize("damage", [b"", b"{", b'{"id": "x1"}', b"\xff"])
+def test_a_damaged_job_keeps_no_other_from_being_there(make_snapshot: Make, tmp_path: Path, damage: bytes) -> None:
+    folder = tmp_path / "sessions"
+    with jobs_of(folder, make_snapshot(2)) as jobs:
+        sound, damaged = (jobs.start("s1", format=kind, options=PLAIN) for kind in ("yolo", "voc"))
+        jobs.wait(damaged.id, timeout=60)
+    (folder / ".exports" / damaged.id / "job.json").write_bytes(damage)
+    with jobs_of(folder) as jobs:
+        assert [job.id for job in jobs.list()] == [sound.id]
+
+
+def test_a_job_that_cannot_be_kept_is_not_made(make_snapshot: Make, tmp_path: Path) -> None:
+    (tmp_path / "sessions").mkdir()
+    (tmp_path / "sessions" / ".exports").write_text("in the way")
+    with jobs_of(tmp_path / "sessions", make_snapshot(2)) as jobs:
+        with pytest.raises(StoreError, match="the export cannot be kept"):
+            jobs.start("s1", format="yolo", options=PLAIN)
+        assert jobs.list() == []
