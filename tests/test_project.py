@@ -95,6 +95,14 @@ def test_the_installed_program_finds_its_page_and_its_migrations(wheel: Path, tm
     assert found["sessions"] == "1, all sound"
 
 
+def test_the_readme_names_every_part_of_the_program() -> None:
+    readme = (CHECKOUT / "README.md").read_text()
+    folder_map = readme.partition("## Folder map")[2].partition("## ")[0]
+    package = CHECKOUT / "ars_web"
+    parts = {path.relative_to(package).parts[0] for path in own_files() if path.is_relative_to(package)}
+    assert {part for part in parts if not part.startswith("__") and part not in folder_map} == set()
+
+
 def test_every_dependency_is_pinned_within_its_range() -> None:
     lines = [line for line in (CHECKOUT / "constraints.txt").read_text().splitlines() if not line.startswith("#")]
     assert lines == sorted(lines, key=str.lower)
