@@ -4,7 +4,7 @@ Appending and applying are one transaction, and listeners are told once it is on
 session. A change that would leave everything as it is makes no edit and no revision.
 """
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -25,7 +25,7 @@ from ars_web.sessions.drafting import (
 )
 from ars_web.sessions.edit_json import request_digest
 from ars_web.sessions.edits import BoxChange, Change, ClassChange, Edit, NameChange, inverse, restated
-from ars_web.sessions.history import to_redo, to_undo
+from ars_web.sessions.history import LogEntry, to_redo, to_undo
 from ars_web.sessions.listeners import Listener, Listeners
 from ars_web.sessions.model import ObjectClass, SessionSummary, VirtualBox
 from ars_web.sessions.names import checked_key, checked_name
@@ -207,18 +207,7 @@ class SessionEditor:
             NothingToUndo: there is none.
             Conflict: someone else changed the same thing since; nothing is changed.
         """
-        with self._editing(sid) as session:
-            digest = request_digest("undo", author)
-            before = None if key is None else session.answered(checked_key(key), digest=digest)
-            if before is not None:
-                return before
-            revision = to_undo(session.newest_entries(author=author))
-            if revision is None:
-                raise NothingToUndo(f"{author!r} has nothing to undo in this session")
-            edit = self._invert(sid, session, session.edit(revision), author=author, verb="Undo")
-            if key is not None:
-                session.remember(key, digest=digest)
-        return edit
+        return self._take_turn(sid, "Undo", to_undo, author=author, key=key)
 
     def redo(self, sid: str, *, author: str, key: str | None = None) -> Edit:
         """Make again what the author's newest undo took back, unless something new was done since.
@@ -229,24 +218,36 @@ class SessionEditor:
             NothingToUndo: there is no such undo.
             Conflict: someone else changed the same thing since; nothing is changed.
         """
-        with self._editing(sid) as session:
-            digest = request_digest("redo", author)
-            before = None if key is None else session.answered(checked_key(key), digest=digest)
-            if before is not None:
-                return before
-            revision = to_redo(session.newest_entries(author=author))
-            if revision is None:
-                raise NothingToUndo(f"{author!r} has nothing to redo in this session")
-            edit = self._invert(sid, session, session.edit(revision), author=author, verb="Redo")
-            if key is not None:
-                session.remember(key, digest=digest)
-        return edit
+        return self._take_turn(sid, "Redo", to_redo, author=author, key=key)
 
     @contextmanager
     def _editing(self, sid: str) -> Generator[SessionTransaction]:
         with self._store.writing(sid, committed=lambda edits: self._listeners.put(sid, edits)) as session:
             yield session
         self._listeners.tell()
+
+    def _take_turn(
+        self,
+        sid: str,
+        verb: str,
+        choose: Callable[[Iterable[LogEntry]], int | None],
+        *,
+        author: str,
+        key: str | None,
+    ) -> Edit:
+        """Invert the edit whose revision `choose` picks from the author's own, once a key."""
+        with self._editing(sid) as session:
+            digest = request_digest(verb.lower(), author)
+            before = None if key is None else session.answered(checked_key(key), digest=digest)
+            if before is not None:
+                return before
+            revision = choose(session.newest_entries(author=author))
+            if revision is None:
+                raise NothingToUndo(f"{author!r} has nothing to {verb.lower()} in this session")
+            edit = self._invert(sid, session, session.edit(revision), author=author, verb=verb)
+            if key is not None:
+                session.remember(key, digest=digest)
+        return edit
 
     def _invert(self, sid: str, session: SessionTransaction, edit: Edit, *, author: str, verb: str) -> Edit:
         try:
