@@ -1,16 +1,16 @@
 """The compiled loops that cut rings and curves to the image, and label what is left of them.
 
-Coordinates are image coordinates; rings run counter-clockwise as seen in the image, y down. Kernels call only kernels
-of their own file: numba's cache notices a change only in the file of the function that it keeps.
+Coordinates are image coordinates; rings run counter-clockwise as seen in the image, y down.
 """
 
 import numpy as np
-from numba import njit
+
+from ars_web.geometry.compiled import entry, part
 
 Array = np.ndarray
 
 
-@njit(error_model="numpy", forceinline=True)
+@part
 def in_image(width: float, height: float, u0: float, v0: float, u1: float, v1: float) -> tuple[float, float]:
     """The part (from, to) of a straight piece, in [0, 1], that lies in the image; (1, 0) where none does."""
     low, high = 0.0, 1.0
@@ -25,13 +25,13 @@ def in_image(width: float, height: float, u0: float, v0: float, u1: float, v1: f
     return (low, high) if low <= high else (1.0, 0.0)
 
 
-@njit(error_model="numpy", forceinline=True)
+@part
 def clamped_integral(v: float, height: float) -> float:
     """Integral of min(max(v, 0), height) from 0 to v."""
     return 0.0 if v <= 0.0 else (0.5 * v * v if v <= height else height * (v - 0.5 * height))
 
 
-@njit(error_model="numpy", forceinline=True)
+@part
 def area_in_image(width: float, height: float, u0: float, v0: float, u1: float, v1: float) -> float:
     """What one side of a ring adds to the area of the ring within the image: the integral of v, clamped to the
     image's height, over the part of u within its width. Its sum over any ring is the signed area."""
@@ -49,26 +49,26 @@ def area_in_image(width: float, height: float, u0: float, v0: float, u1: float, 
     return (clamped_integral(vb, height) - clamped_integral(va, height)) / (vb - va) * (ub - ua)
 
 
-@njit(error_model="numpy", forceinline=True)
+@part
 def place_in_image(width: float, height: float, u: float, v: float) -> tuple[float, float]:
     """A point of the image without what rounding put beyond its borders."""
     return min(max(u, 0.0), width), min(max(v, 0.0), height)
 
 
-@njit(error_model="numpy", forceinline=True)
+@part
 def start_bbox(bbox: Array) -> None:
     """A box of nothing."""
     bbox[0], bbox[1], bbox[2], bbox[3] = np.inf, np.inf, -np.inf, -np.inf
 
 
-@njit(error_model="numpy", forceinline=True)
+@part
 def grow_bbox(bbox: Array, u: float, v: float) -> None:
     """Make a box hold a point."""
     bbox[0], bbox[1] = min(bbox[0], u), min(bbox[1], v)
     bbox[2], bbox[3] = max(bbox[2], u), max(bbox[3], v)
 
 
-@njit(error_model="numpy")
+@part
 def label_of_ring(width: float, height: float, ring: Array, missed: float, bbox: Array) -> float:
     """The box of the part of a ring's inside that lies in the image, written to `bbox`, and the share of its area
     that does not. The corners of the part are the ring's own, where it crosses the image's border, and the image's
@@ -116,7 +116,7 @@ def label_of_ring(width: float, height: float, ring: Array, missed: float, bbox:
     return min(max(1.0 - part / whole, 0.0), 1.0) if whole != 0.0 else 0.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@entry
 def label_rings(
     width: float,
     height: float,
@@ -143,7 +143,7 @@ def label_rings(
                 grow_bbox(bboxes_amodal[i], ring[j, 0], ring[j, 1])
 
 
-@njit(error_model="numpy")
+@part
 def cut_to_image(width: float, height: float, ring: Array, m: int, spare: Array) -> int:
     """Cut a ring to the image in place (Sutherland and Hodgman); how many points are left, 0 for none.
 
@@ -169,7 +169,7 @@ def cut_to_image(width: float, height: float, ring: Array, m: int, spare: Array)
     return without_spikes(width, height, ring, m)
 
 
-@njit(error_model="numpy")
+@part
 def without_spikes(width: float, height: float, ring: Array, m: int) -> int:
     """Take out of a ring, in place, repeated points and those between two others on one of the image's borders."""
     k = 0
@@ -192,7 +192,7 @@ def without_spikes(width: float, height: float, ring: Array, m: int) -> int:
     return k - first if k - first >= 3 else 0
 
 
-@njit(error_model="numpy")
+@part
 def spare_point(width: float, height: float, a: Array, b: Array, c: Array) -> bool:
     """Whether b says nothing that a and c do not: all three lie on one border of the image."""
     return (
@@ -203,7 +203,7 @@ def spare_point(width: float, height: float, a: Array, b: Array, c: Array) -> bo
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@entry
 def cut_rings(width: float, height: float, points: Array, lengths: Array) -> tuple[Array, Array]:
     """Rings, one after the other in `points` (k, 2), cut to the image: all points left, and how many each has."""
     # Each of the four cuts can leave half as many points again, where a ring zigzags across a border.
@@ -231,7 +231,7 @@ def cut_rings(width: float, height: float, points: Array, lengths: Array) -> tup
     return cut[:k].copy(), counts
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@entry
 def cut_curves(width: float, height: float, points: Array, lengths: Array) -> tuple[Array, Array]:
     """Curves, one after the other in `points` (k, 2), cut to the image: all points left, and how many each part has; a
     curve leaves none, one, or more where it leaves the image and comes back."""

@@ -2,15 +2,15 @@
 
 Within its valid radius, the rim, a lens maps the normalised plane one-to-one, so the image of a shadow's border is the
 border of its image: everything here follows that one ring. Coordinates are image coordinates; rings run
-counter-clockwise as seen in the image, y down. Kernels call only kernels of their own file: numba's cache notices a
-change only in the file of the function that it keeps.
+counter-clockwise as seen in the image, y down.
 """
 
 import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+
+from ars_web.geometry.compiled import entry, part
 
 Array = np.ndarray
 
@@ -56,7 +56,7 @@ class Lens(NamedTuple):
     bins_per_e: float
 
 
-@njit(error_model="numpy", forceinline=True)
+@part
 def brown_point(lens: Lens, x: float, y: float) -> tuple[float, float]:
     """Image coordinates of a point of the normalised plane within the rim of a Brown or pinhole camera."""
     r2 = x * x + y * y
@@ -66,7 +66,7 @@ def brown_point(lens: Lens, x: float, y: float) -> tuple[float, float]:
     return lens.fx * u + lens.cx, lens.fy * v + lens.cy
 
 
-@njit(error_model="numpy")
+@part
 def fisheye_point(lens: Lens, x: float, y: float) -> tuple[float, float]:
     """Image coordinates of a point of the normalised plane within the rim of a fisheye camera."""
     r = math.sqrt(x * x + y * y)
@@ -77,13 +77,13 @@ def fisheye_point(lens: Lens, x: float, y: float) -> tuple[float, float]:
     return lens.fx * x * scale + lens.cx, lens.fy * y * scale + lens.cy
 
 
-@njit(error_model="numpy", forceinline=True)
+@part
 def image_point(lens: Lens, x: float, y: float) -> tuple[float, float]:
     """Image coordinates of a point of the normalised plane within the rim (camera.pixels_from_normalised)."""
     return fisheye_point(lens, x, y) if lens.fisheye else brown_point(lens, x, y)
 
 
-@njit(error_model="numpy")
+@part
 def sample(lens: Lens, x: float, y: float, dx: float, dy: float, n: int, points: Array) -> None:
     """Image coordinates of the n points (x + i dx, y + i dy), i from 1, written to `points`."""
     # Two loops, because the processor takes several points at a time only where none needs an arc tangent.
@@ -95,7 +95,7 @@ def sample(lens: Lens, x: float, y: float, dx: float, dy: float, n: int, points:
             points[i, 0], points[i, 1] = brown_point(lens, x + (i + 1) * dx, y + (i + 1) * dy)
 
 
-@njit(error_model="numpy", forceinline=True)
+@part
 def bend_bin(lens: Lens, bends: Array, r: float) -> int:
     """The bin of a radius in the bend table."""
     last = bends.shape[1] - 1
@@ -105,7 +105,7 @@ def bend_bin(lens: Lens, bends: Array, r: float) -> int:
     return min(max(math.floor(place), 0), last)
 
 
-@njit(error_model="numpy")
+@part
 def polygon_bend(lens: Lens, bends: Array, bound: int, xy: Array, n: int) -> float:
     """One of the bounds in the bend table for all that a polygon holds within the rim."""
     r2 = 0.0
@@ -114,7 +114,7 @@ def polygon_bend(lens: Lens, bends: Array, bound: int, xy: Array, n: int) -> flo
     return bends[bound, bend_bin(lens, bends, math.sqrt(r2))]
 
 
-@njit(error_model="numpy")
+@part
 def within_disc(xy: Array, n: int, radius: float) -> bool:
     """Whether all corners of a polygon lie in a disc round the origin."""
     for i in range(n):
@@ -123,7 +123,7 @@ def within_disc(xy: Array, n: int, radius: float) -> bool:
     return True
 
 
-@njit(error_model="numpy")
+@part
 def append_curve(
     lens: Lens,
     bends: Array,
@@ -150,13 +150,13 @@ def append_curve(
     return m + n
 
 
-@njit(error_model="numpy", forceinline=True)
+@part
 def far_tolerance(distance: float) -> float:
     """What a curve may be off in addition where it is some pixels away from the image."""
     return distance * min(2e-5 * (1.0 + 1e-4 * distance), 1e-3)
 
 
-@njit(error_model="numpy")
+@part
 def append_outside_curve(
     lens: Lens,
     bend: float,
@@ -188,7 +188,7 @@ def append_outside_curve(
     return m + n, missed
 
 
-@njit(error_model="numpy")
+@part
 def append_long_curve(
     lens: Lens, bends: Array, x0: float, y0: float, x1: float, y1: float, tolerance: float, points: Array, m: int
 ) -> int:
@@ -231,7 +231,7 @@ def append_long_curve(
         stretch *= 2.0
 
 
-@njit(error_model="numpy")
+@part
 def append_arc(lens: Lens, start: float, sweep: float, tolerance: float, points: Array, m: int) -> int:
     """Append the image of the rim from the angle `start`, `sweep` radians counter-clockwise, its start left out.
 
@@ -255,7 +255,7 @@ def append_arc(lens: Lens, start: float, sweep: float, tolerance: float, points:
     return m
 
 
-@njit(error_model="numpy", forceinline=True)
+@part
 def within_rim(lens: Lens, x0: float, y0: float, x1: float, y1: float) -> tuple[float, float]:
     """The part (from, to) of a straight piece, in [0, 1], that lies within the rim; (1, 0) where none does."""
     dx, dy = x1 - x0, y1 - y0
@@ -272,7 +272,7 @@ def within_rim(lens: Lens, x0: float, y0: float, x1: float, y1: float) -> tuple[
     return low, high
 
 
-@njit(error_model="numpy")
+@part
 def outline_ring(lens: Lens, bends: Array, xy: Array, n: int, tolerance: float, points: Array) -> tuple[int, float]:
     """The image of a convex polygon cut to the rim, as a ring written to `points`; how many, 0 for none, and how much
     more area there is within the true outline than within the ring."""
@@ -308,7 +308,7 @@ def outline_ring(lens: Lens, bends: Array, xy: Array, n: int, tolerance: float, 
     return m - 1, missed  # the last point is the first again
 
 
-@njit(error_model="numpy")
+@part
 def append_arc_between(
     lens: Lens, x0: float, y0: float, x1: float, y1: float, tolerance: float, points: Array, m: int
 ) -> int:
@@ -323,7 +323,7 @@ def append_arc_between(
     return m + 1
 
 
-@njit(error_model="numpy")
+@part
 def holds(xy: Array, n: int, x: float, y: float) -> bool:
     """Whether a convex polygon holds a point; NaN it does not."""
     for i in range(n):
@@ -333,14 +333,14 @@ def holds(xy: Array, n: int, x: float, y: float) -> bool:
     return True
 
 
-@njit(error_model="numpy", forceinline=True)
+@part
 def grow_bbox(bbox: Array, u: float, v: float) -> None:
     """Make a box hold a point."""
     bbox[0], bbox[1] = min(bbox[0], u), min(bbox[1], v)
     bbox[2], bbox[3] = max(bbox[2], u), max(bbox[3], v)
 
 
-@njit(error_model="numpy")
+@part
 def amodal_bbox(lens: Lens, bends: Array, xy: Array, n: int, tolerance: float, points: Array, bbox: Array) -> bool:
     """The box of a polygon's image without sampling what cannot extend it; False where the rim cuts the polygon.
 
@@ -374,7 +374,7 @@ def amodal_bbox(lens: Lens, bends: Array, xy: Array, n: int, tolerance: float, p
     return True
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@entry
 def boxes_of_shadows(
     lens: Lens,
     bends: Array,
@@ -406,7 +406,7 @@ def boxes_of_shadows(
                     truncated[frame, box] = 0.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@entry
 def rings_of_shadows(
     lens: Lens, bends: Array, polygons: Array, corners: Array, wanted: Array, tolerance: float
 ) -> tuple[Array, Array, Array]:
@@ -435,7 +435,7 @@ def rings_of_shadows(
     return found[:k].copy(), lengths, missed
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@entry
 def curves_of_edges(lens: Lens, bends: Array, edges: Array, tolerance: float) -> tuple[Array, Array]:
     """Images of straight pieces (n, 2, 2), cut to the rim: all points (k, 2), and (n,) how many each has, 0 for those
     beyond the rim."""

@@ -1,18 +1,15 @@
-"""The compiled loops behind `occlusion.py`: rays against the slabs of boxes.
-
-Kernels call only kernels of their own file: numba's cache notices a change only in the file of the function that it
-keeps.
-"""
+"""The compiled loops behind `occlusion.py`: rays against the slabs of boxes."""
 
 import math
 
 import numpy as np
-from numba import njit
+
+from ars_web.geometry.compiled import entry, part
 
 Array = np.ndarray
 
 
-@njit(error_model="numpy")
+@part
 def place_boxes(
     T_world_camera: Array, Ts_world_box: Array, halves: Array, near: float, planes: Array, depth: Array, sides: Array
 ) -> None:
@@ -52,7 +49,7 @@ def place_boxes(
         depth[b, 0], depth[b, 1] = -np.inf if inside else z - reach, z + reach
 
 
-@njit(error_model="numpy")
+@part
 def cast_grid(
     rays: Array,
     spacing: float,
@@ -88,7 +85,7 @@ def cast_grid(
             ys[i * columns + j] = line_y[k] + right[j] * (line_y[k + 1] - line_y[k])
 
 
-@njit(error_model="numpy")
+@part
 def inverse_depths(
     planes: Array, xs: Array, ys: Array, start: int, end: int, near: float, entries: Array, exits: Array
 ) -> None:
@@ -114,14 +111,14 @@ def inverse_depths(
         exits[i] = leave if hit else 0.0
 
 
-@njit(error_model="numpy")
+@part
 def hide(seen: Array, others: Array, start: int, end: int) -> None:
     """Make 0 those inverse depths that lie behind others."""
     for i in range(start, end):
         seen[i] = 0.0 if others[i] > seen[i] else seen[i]
 
 
-@njit(error_model="numpy")
+@part
 def count(inverse: Array, n: int) -> int:
     """How many of the first n inverse depths are not 0."""
     found = 0
@@ -130,7 +127,7 @@ def count(inverse: Array, n: int) -> int:
     return found
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@entry
 def visible_shares(
     Ts_world_camera: Array,
     Ts_world_box: Array,

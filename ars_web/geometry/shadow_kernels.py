@@ -1,12 +1,12 @@
 """The compiled loops that cast a box's shadow: what lies in front of a camera, on its normalised plane (x/z, y/z).
 
 What is in front of the near plane of a box is convex, so its shadow is a convex polygon. Polygons run
-counter-clockwise as seen in the image, y down. Kernels call only kernels of their own file: numba's cache notices a
-change only in the file of the function that it keeps.
+counter-clockwise as seen in the image, y down.
 """
 
 import numpy as np
-from numba import njit
+
+from ars_web.geometry.compiled import entry, part
 
 Array = np.ndarray
 
@@ -14,7 +14,7 @@ MOST_CORNERS = 16
 """Of a shadow. A box has 8 corners, and a plane cuts at most 6 of its edges."""
 
 
-@njit(error_model="numpy")
+@part
 def place_box(T_world_camera: Array, T_world_box: Array, R: Array, t: Array) -> None:
     """Rotation `R` (3, 3) and translation `t` (3,) of `T_camera_box`, written in place."""
     for i in range(3):
@@ -26,7 +26,7 @@ def place_box(T_world_camera: Array, T_world_box: Array, R: Array, t: Array) -> 
                 R[i, j] += T_world_camera[k, i] * T_world_box[k, j]
 
 
-@njit(error_model="numpy")
+@part
 def place_corner(R: Array, t: Array, half: Array, corner: int, axis: int) -> float:
     """One camera coordinate of a corner, numbered as box.CORNER_SIGNS."""
     x = half[0] if corner & 4 else -half[0]
@@ -35,7 +35,7 @@ def place_corner(R: Array, t: Array, half: Array, corner: int, axis: int) -> flo
     return t[axis] + R[axis, 0] * x + R[axis, 1] * y + R[axis, 2] * z
 
 
-@njit(error_model="numpy")
+@part
 def shadow(R: Array, t: Array, half: Array, near: float, rings: Array, xy: Array) -> int:
     """The corners of a box's shadow on the normalised plane, written to `xy` (MOST_CORNERS, 2); how many, 0 for none.
 
@@ -60,7 +60,7 @@ def shadow(R: Array, t: Array, half: Array, near: float, rings: Array, xy: Array
     return n
 
 
-@njit(error_model="numpy")
+@part
 def shadow_of_cut_box(R: Array, t: Array, half: Array, near: float, xy: Array) -> int:
     """The same for a box that the near plane cuts: the hull of what is left of its corners and edges."""
     found = np.empty((MOST_CORNERS, 2))
@@ -82,7 +82,7 @@ def shadow_of_cut_box(R: Array, t: Array, half: Array, near: float, xy: Array) -
     return hull(found[:n], xy)
 
 
-@njit(error_model="numpy")
+@part
 def hull(points: Array, ring: Array) -> int:
     """The convex hull of a few points, written to `ring`; how many (Andrew's monotone chain). Sorts `points`."""
     n = len(points)
@@ -106,13 +106,13 @@ def hull(points: Array, ring: Array) -> int:
     return m if m >= 3 else 0
 
 
-@njit(error_model="numpy")
+@part
 def turn(a: Array, b: Array, c: Array) -> float:
     """Negative where a, b, c turn counter-clockwise as seen in the image (y down)."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@entry
 def cast_shadows(
     Ts_world_camera: Array,
     Ts_world_box: Array,
@@ -133,7 +133,7 @@ def cast_shadows(
             corners[frame, box] = shadow(R, t, halves[box], near, rings, polygons[frame, box])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@entry
 def cast_edges(T_world_camera: Array, T_world_box: Array, half: Array, near: float, edges: Array) -> int:
     """The parts of a box's twelve edges that are in front, written to `edges` (12, 2, 2) as (start, end); how many."""
     R, t = np.empty((3, 3)), np.empty(3)
