@@ -19,8 +19,13 @@ SPLITS: tuple[Literal["train", "val", "test"], ...] = ("train", "val", "test")
 """A split's number is its place here."""
 
 BLOCKS = 30
-"""Blocks in each session, as nearly as its frame count allows: enough to meet the shares and to spread over the
-recording, few enough that nearly every validation frame's neighbours are validation frames too."""
+"""Blocks in each session where it is long: enough to meet the shares and to spread over the recording."""
+
+FEWEST_BLOCKS = 10
+"""Blocks in a session that is too short for others: as many as tenths, which most shares are."""
+
+BLOCK_FRAMES = 20
+"""Frames that a block has where the session has enough: few validation frames then have a neighbour in training."""
 
 
 def assign(frame_counts: Sequence[int], choice: SplitChoice) -> Int[np.ndarray, "n"]:
@@ -44,11 +49,15 @@ def assign(frame_counts: Sequence[int], choice: SplitChoice) -> Int[np.ndarray, 
         return np.repeat(of_session, np.asarray(frame_counts, dtype=np.int64))
     parts = [np.zeros(0, dtype=np.int8)]
     for number, count in enumerate(frame_counts):
-        units = min(BLOCKS, count) if choice.by == "block" else count
+        units = _blocks(count) if choice.by == "block" else count
         of_unit = _deal(units, shares, salt=f"{choice.seed}/{number}")
         # Frame i lies in unit floor(i * units / count): lengths differ by one at most.
         parts.append(of_unit[np.arange(count) * units // max(count, 1)])
     return np.concatenate(parts)
+
+
+def _blocks(frames: int) -> int:
+    return min(frames, max(FEWEST_BLOCKS, min(BLOCKS, frames // BLOCK_FRAMES)))
 
 
 def apportion(units: int, shares: Sequence[float]) -> list[int]:

@@ -22,6 +22,15 @@ def test_blocks_are_contiguous_runs_that_meet_the_shares() -> None:
     assert (edges % (3000 // BLOCKS) == 0).all()
 
 
+@pytest.mark.parametrize(("frames", "longest"), [(60, 6), (99, 9), (300, 20), (590, 20), (600, 20), (36000, 1200)])
+def test_blocks_of_short_recordings_keep_neighbours_together(frames: int, longest: int) -> None:
+    splits = assign([frames], SplitChoice())
+    assert splits.sum() == pytest.approx(0.2 * frames, abs=longest)
+    edges = np.flatnonzero(np.diff(splits)) + 1
+    lengths = np.diff(np.concatenate([[0], edges, [frames]]))
+    assert lengths.min() >= longest
+
+
 def test_frames_are_dealt_one_by_one() -> None:
     splits = assign([1000], SplitChoice(by="frame"))
     assert np.bincount(splits).tolist() == [800, 200]
