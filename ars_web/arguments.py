@@ -203,6 +203,8 @@ def _refused(error: "ValidationError") -> typer.BadParameter:
     option = SPELLED_DIFFERENTLY.get(names[0], "--" + "-".join(names).replace("_", "-")) if names else None
     if names == ["split"]:
         option = "--split-train, --split-val, --split-test"
+    elif names == ["frames"]:
+        option = "--frames-list"
     message = fault["msg"].removeprefix("Value error, ")
     given = "" if isinstance(fault["input"], dict) else f", not {fault['input']}"
     return typer.BadParameter(f"{message}{given}", param_hint=option)

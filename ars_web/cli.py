@@ -135,7 +135,7 @@ def import_recording(
     with SessionStore(sessions) as store, progress("Importing frames") as advance:
         made = store.create(
             recording,
-            name=name or take.session_name(path),
+            name=take.session_name(path) if name is None else name,
             class_names=class_names,
             copy_images=copy,
             progress=advance,
@@ -200,6 +200,8 @@ def export_boxes(
         return
     if file.exists() and not force:
         raise BadInput(f"{file} exists already: name another file, or replace it with --force")
+    if not file.parent.is_dir():
+        raise BadInput(f"{file} cannot be written: there is no folder {file.parent}; make it first")
     write_json(file, boxes)
     note(f"{len(boxes)} boxes in {file}")
 

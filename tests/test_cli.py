@@ -234,6 +234,7 @@ def test_json_is_all_there_is_on_stdout(
         (("export", "SESSION", "--format", "yolo", "--out", "D", "--min-visible", "2"), "--min-visible"),
         (("export", "SESSION", "--format", "yolo", "--out", "D", "--frames-step", "0"), "--frames-step"),
         (("export", "SESSION", "--format", "yolo", "--out", "D", "--frames-list", "1,x"), "--frames-list"),
+        (("export", "SESSION", "--format", "yolo", "--out", "D", "--frames-list", "1", "--frames-step", "2"), "both"),
         (("export", "SESSION", "--format", "yolo", "--out", "D", "--split-train", "0.9"), "--split-train"),
         (("export", "SESSION", "--format", "yolo", "--out", "D", "--images", "steal"), "--images"),
         (("serve", "--root", "here"), "NAME=PATH"),
@@ -253,7 +254,9 @@ def test_wrong_arguments_end_with_2_and_one_line(
     assert line.endswith("--help`)")
 
 
-def test_what_is_wrong_with_the_input_ends_with_1_and_one_line(shared: tuple[Commands, str], tmp_path: Path) -> None:
+def test_what_is_wrong_with_the_input_ends_with_1_and_one_line(
+    shared: tuple[Commands, str], recording: Path, tmp_path: Path
+) -> None:
     run, session = shared
     assert "nope" in one_line(run("export", "nope", "--format", "yolo", "--out", tmp_path / "d", status=1))
     assert "nowhere" in one_line(run("import", "nowhere", status=1))
@@ -263,7 +266,9 @@ def test_what_is_wrong_with_the_input_ends_with_1_and_one_line(shared: tuple[Com
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "file").touch()
     assert "full" in one_line(run("export", session, "--format", "yolo", "--out", tmp_path / "full", status=1))
-    assert "nowhere" in one_line(run("boxes", "export", session, tmp_path / "nowhere" / "boxes.json", status=1))
+    unwritten = one_line(run("boxes", "export", session, tmp_path / "nowhere" / "boxes.json", status=1))
+    assert f"there is no folder {tmp_path / 'nowhere'}" in unwritten
+    assert "not empty" in one_line(run("import", recording, "--name", "", status=1))
 
 
 def test_a_folder_whose_name_is_not_utf8_is_refused_in_one_line(run: Commands, recording: Path) -> None:

@@ -21,6 +21,12 @@ class FrameChoice(_Strict):
     stop: Count | None = None
     list: tuple[Count, ...] | None = None
 
+    @model_validator(mode="after")
+    def _one_of_the_two(self) -> "FrameChoice":
+        if self.list is not None and (self.step, self.start, self.stop) != (1, 0, None):
+            raise ValueError("give a list, or step, start and stop, not both: one of them would be ignored")
+        return self
+
 
 class SplitChoice(_Strict):
     """How frames are divided.
