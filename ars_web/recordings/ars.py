@@ -16,7 +16,7 @@ from jaxtyping import Float
 from ars_web.errors import BadFile
 from ars_web.geometry.rigid_transform import Transform
 from ars_web.recordings.frames import ListedFrame, usable_frames
-from ars_web.recordings.image_folder import list_images
+from ars_web.recordings.image_folder import list_images, uncounted
 from ars_web.recordings.intrinsics import CAMERA_FILE, read_camera_file
 from ars_web.recordings.number_rows import read_rows
 from ars_web.recordings.options import ReadOptions
@@ -50,8 +50,8 @@ def read(path: Path, options: ReadOptions) -> Recording:
     if len(images) != len(rows.values):
         raise BadFile(
             poses_file,
-            f"has {len(rows.values)} poses for {len(images)} images in {images[0].parent}; which pose is whose"
-            " cannot be known",
+            f"has {len(rows.values)} poses for {len(images)} images in {images[0].parent}{uncounted(images)};"
+            " which pose is whose cannot be known",
         )
     T_wrist_camera = _camera_in_wrist(options.allowed(path / _EXTRINSICS_FILE))
     cameras = {0: read_camera_file(options.allowed(options.camera or path / CAMERA_FILE))}

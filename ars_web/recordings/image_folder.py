@@ -29,6 +29,15 @@ def list_images(folder: Path) -> list[Path]:
     raise BadFile(folder, "holds no JPEG and no PNG image")
 
 
+def uncounted(images: list[Path]) -> str:
+    """What a complaint about the number of `images`, as `list_images` found them, has to add: the PNG images that lie
+    beside JPEG ones and do not count. Empty where there are none."""
+    if images[0].suffix.lower() not in _KINDS[0]:
+        return ""
+    others = [path.name for path in files_in(images[0].parent) if path.suffix.lower() in _KINDS[1]]
+    return f" ({len(others)} PNG images beside the JPEG ones, {others[0]} first, do not count)" if others else ""
+
+
 def files_in(folder: Path) -> list[Path]:
     """The entries of a folder sorted by name, hidden ones left out.
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ars_web.errors import BadFile, BadInput
 from ars_web.recordings.frames import ListedFrame, usable_frames
-from ars_web.recordings.image_folder import files_in, list_images
+from ars_web.recordings.image_folder import files_in, list_images, uncounted
 from ars_web.recordings.intrinsics import find_camera_file, read_camera_file
 from ars_web.recordings.number_rows import count_numbers, read_rows
 from ars_web.recordings.options import ReadOptions, real
@@ -56,7 +56,9 @@ def read(path: Path, options: ReadOptions) -> Recording:
     images = list_images(folder)
     if len(images) != len(poses.Ts):
         raise BadFile(
-            file, f"has {len(poses.Ts)} poses for {len(images)} images in {folder}; which pose is whose cannot be known"
+            file,
+            f"has {len(poses.Ts)} poses for {len(images)} images in {folder}{uncounted(images)}; which pose is whose"
+            " cannot be known",
         )
     cameras = {0: read_camera_file(find_camera_file([file.parent, real(folder).parent], options))}
     listed = [ListedFrame(None, image, 0, f"{file}:{line}") for image, line in zip(images, lines, strict=True)]

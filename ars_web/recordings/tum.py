@@ -15,7 +15,7 @@ from jaxtyping import Float, Int
 
 from ars_web.errors import BadFile, BadInput
 from ars_web.recordings.frames import ListedFrame, usable_frames
-from ars_web.recordings.image_folder import list_images
+from ars_web.recordings.image_folder import list_images, uncounted
 from ars_web.recordings.intrinsics import find_camera_file, read_camera_file
 from ars_web.recordings.number_rows import NumberRows, count_numbers, file_bytes, read_rows
 from ars_web.recordings.options import ReadOptions, real
@@ -77,8 +77,8 @@ def _by_order(rows: NumberRows, options: ReadOptions) -> tuple[Path, list[Listed
     if len(images) != len(rows.values):
         raise BadFile(
             rows.path,
-            f"has {len(rows.values)} poses for {len(images)} images in {folder}; without an rgb.txt that gives the"
-            " images' times, which pose is whose cannot be known",
+            f"has {len(rows.values)} poses for {len(images)} images in {folder}{uncounted(images)}; without an rgb.txt"
+            " that gives the images' times, which pose is whose cannot be known",
         )
     return real(folder), [ListedFrame(None, image, 0, rows.where(i)) for i, image in enumerate(images)]
 

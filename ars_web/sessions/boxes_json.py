@@ -149,5 +149,6 @@ def _first_fault(error: ValidationError) -> str:
         return "must hold a list of boxes, as `ars-web boxes export` writes it"
     where = f"box {place[0]}" + "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in place[1:])
     more = f" (and {len(faults) - 1} more faults)" if len(faults) > 1 else ""
+    message = fault["msg"].removeprefix("Value error, ")
     given = "" if fault["type"] == "missing" else f", not {str(fault['input'])[:60]}"
-    return f"{where}: {fault['msg']}{given}{more}; boxes are counted from 0"
+    return f"{where}: {message}{given}{more}; boxes are counted from 0"

@@ -69,6 +69,13 @@ def test_hidden_files_and_folders_beside_are_not_looked_at(scene: Path) -> None:
     assert len(read_recording(scene).frames) == 6
 
 
+def test_images_of_two_kinds_are_no_riddle(scene: Path, image_writer) -> None:
+    (scene / "images" / "frame_002.png").unlink()
+    image_writer(scene / "images" / "frame_002.jpg")
+    with pytest.raises(BadFile, match=r"6 poses for 1 images in .*\(5 PNG images beside the JPEG ones, frame_000\.png"):
+        read_recording(scene)
+
+
 def test_names_that_sort_two_ways_are_an_error(scene: Path) -> None:
     for old, new in ((2, 9), (3, 10)):
         (scene / "images" / f"frame_00{old}.png").rename(scene / "images" / f"frame_{new}.png")

@@ -105,7 +105,7 @@ def placed(**values: object) -> str:
         (changed(colour="red"), r"box 1\.colour: Extra inputs are not permitted"),
         (changed(name=""), r"box 1\.name: "),
         (changed(name="n" * 101), r"box 1\.name: "),
-        (placed(wxyz=[0, 0, 0, 0]), r"box 1\.T_world_box\.wxyz: .* must not be zero"),
+        (placed(wxyz=[0, 0, 0, 0]), r"box 1\.T_world_box\.wxyz: a quaternion must not be zero"),
         (placed(wxyz=[1e308, 1e308, 0, 0]), r"box 1\.T_world_box\.wxyz: .* too long"),
         (placed(wxyz=[1, 0, 0]), r"box 1\.T_world_box\.wxyz\[3\]: Field required"),
         (placed(position=[0, float("-inf"), 0]), r"box 1\.T_world_box\.position\[1\]: .* finite"),
