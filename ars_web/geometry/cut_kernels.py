@@ -116,6 +116,47 @@ def label_of_ring(width: float, height: float, ring: Array, missed: float, bbox:
     return min(max(1.0 - part / whole, 0.0), 1.0) if whole != 0.0 else 0.0
 
 
+@part
+def bbox_within(width: float, height: float, margin: float, ring: Array, bbox: Array) -> None:
+    """The box, cut to the image, of what of a ring's sides lies in the image widened by a margin, which may be
+    negative."""
+    start_bbox(bbox)
+    wide, high = width + 2.0 * margin, height + 2.0 * margin
+    u0, v0 = ring[len(ring) - 1, 0] + margin, ring[len(ring) - 1, 1] + margin
+    inside_before = 0.0 <= u0 <= wide and 0.0 <= v0 <= high
+    for i in range(len(ring)):
+        u1, v1 = ring[i, 0] + margin, ring[i, 1] + margin
+        inside = 0.0 <= u1 <= wide and 0.0 <= v1 <= high
+        if inside and inside_before:
+            grow_bbox(bbox, u1, v1)
+        elif not (
+            (u0 < 0.0 and u1 < 0.0) or (u0 > wide and u1 > wide) or (v0 < 0.0 and v1 < 0.0) or min(v0, v1) > high
+        ):
+            start, end = in_image(wide, high, u0, v0, u1, v1)
+            if start <= end:
+                grow_bbox(bbox, u0 + start * (u1 - u0), v0 + start * (v1 - v0))
+                grow_bbox(bbox, u0 + end * (u1 - u0), v0 + end * (v1 - v0))
+        u0, v0, inside_before = u1, v1, inside
+    for i in range(2):
+        bbox[2 * i], bbox[2 * i + 1] = place_in_image(width, height, bbox[2 * i] - margin, bbox[2 * i + 1] - margin)
+
+
+@part
+def is_rough(width: float, height: float, ring: Array, tolerance: float, allowed: float) -> bool:
+    """Whether a ring that is off by `tolerance` may leave the box of its part in the image off by more than `allowed`.
+
+    A side that meets the image's border at a small angle is cut far from where it should be. The true ring lies
+    within `tolerance`, so its box lies between those of this ring in a smaller and in a larger image.
+    """
+    least, most = np.empty(4), np.empty(4)
+    bbox_within(width, height, -tolerance, ring, least)
+    bbox_within(width, height, tolerance, ring, most)
+    for i in range(4):
+        if not abs(most[i] - least[i]) <= 2.0 * allowed:
+            return True
+    return False
+
+
 @entry
 def label_rings(
     width: float,
@@ -123,13 +164,16 @@ def label_rings(
     points: Array,
     lengths: Array,
     missed: Array,
+    tolerance: float,
+    allowed: float,
     bboxes: Array,
     bboxes_amodal: Array,
     truncated: Array,
+    rough: Array,
 ) -> None:
     """Labels of those of m boxes that have a ring, the rings one after the other in `points` (k, 2) and what they
     `missed` (m,) outside, written to `bboxes` (m, 4) and `truncated` (m,), and to `bboxes_amodal` (m, 4) where that is
-    NaN."""
+    NaN; `rough` (m,) is set where rings that are off by `tolerance` cannot tell the box to `allowed` pixels."""
     start = 0
     for i in range(len(lengths)):
         if lengths[i] == 0:
@@ -137,6 +181,7 @@ def label_rings(
         ring = points[start : start + lengths[i]]
         start += lengths[i]
         truncated[i] = label_of_ring(width, height, ring, missed[i], bboxes[i])
+        rough[i] = is_rough(width, height, ring, tolerance, allowed)
         if np.isnan(bboxes_amodal[i, 0]):
             start_bbox(bboxes_amodal[i])
             for j in range(len(ring)):
