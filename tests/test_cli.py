@@ -50,6 +50,11 @@ class Output(NamedTuple):
     stderr: str
 
 
+def hear_ctrl_c() -> None:
+    """Undo what a shell does to commands in the background, these tests among them: it lets them ignore Ctrl-C."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 @dataclass(frozen=True)
 class Commands:
     """Runs `ars-web` on one sessions folder."""
@@ -60,7 +65,7 @@ class Commands:
         line = [sys.executable, "-m", "ars_web", *map(str, arguments)]
         environment = {**os.environ, "ARS_WEB_SESSIONS": str(self.sessions), "COLUMNS": "100"}
         pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-        return subprocess.Popen(line, text=True, env=environment, **pipes)
+        return subprocess.Popen(line, text=True, env=environment, preexec_fn=hear_ctrl_c, **pipes)
 
     def __call__(self, *arguments: object, status: int = 0) -> Output:
         """What a command printed; its exit status must be `status`."""
