@@ -1,12 +1,14 @@
 """One session's SQLite database: how it is opened, how a transaction begins, and what its failures mean."""
 
+import sqlite3
 import threading
+import time
 from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 
 from sqlalchemy import Connection, create_engine, event
-from sqlalchemy.engine.interfaces import DBAPIConnection
+from sqlalchemy.engine.interfaces import DBAPIConnection, DBAPICursor
 from sqlalchemy.pool import ConnectionPoolEntry, QueuePool
 
 from ars_web.errors import NotFound, StoreError
@@ -105,8 +107,7 @@ def _configure(connection: DBAPIConnection, record: ConnectionPoolEntry) -> None
     cursor = connection.cursor()
     try:
         cursor.execute(f"PRAGMA busy_timeout = {BUSY_MS}")
-        cursor.execute("PRAGMA journal_mode = WAL")
-        mode = cursor.fetchone()
+        mode = _write_ahead(cursor)
         if mode != ("wal",):
             raise StoreError(f"SQLite cannot keep a write-ahead log here (got {mode}); is this a network file system?")
         # FULL: the log is synced at every commit. NORMAL would lose acknowledged edits in a power cut.
@@ -118,6 +119,20 @@ def _configure(connection: DBAPIConnection, record: ConnectionPoolEntry) -> None
         cursor.execute("PRAGMA trusted_schema = OFF")
     finally:
         cursor.close()
+
+
+def _write_ahead(cursor: DBAPICursor) -> object:
+    """Ask for the write-ahead log until the file is free: for this alone SQLite does not wait by itself, and others
+    may be opening or migrating the same database."""
+    deadline = time.monotonic() + BUSY_MS / 1000
+    while True:
+        try:
+            cursor.execute("PRAGMA journal_mode = WAL")
+            return cursor.fetchone()
+        except sqlite3.OperationalError as error:
+            if "locked" not in str(error) or time.monotonic() > deadline:
+                raise
+            time.sleep(0.01)
 
 
 def _begin(connection: Connection) -> None:
