@@ -20,12 +20,14 @@ class ObjectClass:
         name: unique in its session, not empty.
         color: `#rrggbb`, lower case.
         revision: the session's revision that last changed it; its ETag.
+        default_size: metres, of a new box of this class along its own axes; None: nobody has said.
     """
 
     id: int
     name: str
     color: str
     revision: int
+    default_size: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +41,7 @@ class VirtualBox:
         box: its place and size.
         has_hull: whether a visual hull is stored with it.
         revision: the session's revision that last changed it; its ETag.
+        locked: its class, place and size are not changed, nor is it deleted, until it is unlocked.
     """
 
     id: int
@@ -47,6 +50,7 @@ class VirtualBox:
     box: Box
     has_hull: bool
     revision: int
+    locked: bool = False
 
 
 @dataclass(frozen=True, eq=False)
