@@ -1,14 +1,15 @@
-"""Server-Sent Events: a session's edits as they happen, and again from any revision.
+"""A session's edits as they happen, and again from any revision: for Server-Sent Events and for the live line.
 
-The log in the store is the only queue. A stream holds no edits, only the revision that it has sent; when it is woken
-it reads on from there. So a slow client costs nothing, and one that comes back misses nothing.
+The log in the store is the only queue. Who follows holds no edits, only the revision reached; when woken, it reads on
+from there. So a slow client costs nothing, and one that comes back misses nothing.
 """
 
 import asyncio
 import logging
 from collections.abc import AsyncGenerator, Generator
-from contextlib import asynccontextmanager, contextmanager, suppress
+from contextlib import aclosing, asynccontextmanager, contextmanager, suppress
 from dataclasses import dataclass, field
+from typing import Literal
 
 import orjson
 from starlette.concurrency import run_in_threadpool
@@ -21,7 +22,25 @@ from ars_web.sessions.store import SessionStore
 logger = logging.getLogger(__name__)
 
 EDITS_AT_ONCE = 200
-"""How many edits a stream reads from the log in one go."""
+"""How many edits are read from the log in one go."""
+
+
+@dataclass(frozen=True, eq=False)
+class SessionEvent:
+    """What happened to a session.
+
+    Attributes:
+        name: `ready`: edits follow; `reset`: the client has seen revisions that the session does not have; `edit`;
+            `gone`: the session was deleted, nothing follows; `quiet`: nothing happened for a while.
+        revision: what a client has once it has taken this in.
+        newest: the session's revision, where `name` is `ready` or `reset`; else as `revision`.
+        edit: where `name` is `edit`.
+    """
+
+    name: Literal["ready", "reset", "edit", "gone", "quiet"]
+    revision: int
+    newest: int
+    edit: EditJson | None = None
 
 
 @dataclass(eq=False)
@@ -34,7 +53,7 @@ class _Topic:
 
 
 class EventHub:
-    """Wakes the streams of a session when it changes, whichever process changed it.
+    """Wakes those who follow a session when it changes, whichever process changed it.
 
     Edits made through this process wake them at once (`wake`); those of another process within `poll_seconds`, by
     one cheap look at each session's revision, however many listen. No stream holds a thread.
@@ -81,34 +100,44 @@ class EventHub:
         if self._loop is not None:
             self._loop.call_soon_threadsafe(self._changed, sid, edit.revision)
 
-    async def stream(self, sid: str, *, after: int | None) -> AsyncGenerator[bytes]:
-        """The session's edits after revision `after` (None: from now on) in the event-stream format.
+    async def follow(self, sid: str, *, after: int | None) -> AsyncGenerator[SessionEvent]:
+        """What happens to the session after revision `after` (None: from now on); ends with `gone`, or `close`.
 
-        First comes `ready`, or `reset` where the client has seen revisions that the session does not have; then an
-        `edit` for each, its id the revision; `gone` when the session is deleted. Comments keep the connection up.
+        First comes `ready` or `reset`, then every edit once and in order, and `quiet` each `keep_alive_seconds` in
+        which there was none.
+
+        Raises:
+            NotFound: there is no such session at the beginning.
+            StoreError: its log cannot be read.
         """
         revision = await run_in_threadpool(self._store.revision, sid)
         behind = after is None or after <= revision
         sent = after if after is not None and behind else revision
-        yield _event("ready" if behind else "reset", sent, {"revision": revision})
+        yield SessionEvent("ready" if behind else "reset", sent, revision)
         with self._listening(sid) as topic:
             while not self._closing:
                 changed = topic.changed
                 try:
                     edits = await run_in_threadpool(self._store.edits, sid, after=sent, limit=EDITS_AT_ONCE)
                 except NotFound:
-                    yield _event("gone", sent, {"revision": sent})
+                    yield SessionEvent("gone", sent, sent)
                     return
                 for edit in edits:
-                    yield _event("edit", edit.revision, EditJson.of(edit).model_dump(mode="json"))
                     sent = edit.revision
+                    yield SessionEvent("edit", sent, sent, EditJson.of(edit))
                 if edits or self._closing:
                     continue
                 try:
                     async with asyncio.timeout(self.keep_alive_seconds):
                         await changed.wait()
                 except TimeoutError:
-                    yield b": still here\n\n"
+                    yield SessionEvent("quiet", sent, sent)
+
+    async def stream(self, sid: str, *, after: int | None) -> AsyncGenerator[bytes]:
+        """What `follow` yields in the event-stream format; comments, where it is quiet, keep the connection up."""
+        async with aclosing(self.follow(sid, after=after)) as events:
+            async for event in events:
+                yield _in_stream(event)
 
     @contextmanager
     def _listening(self, sid: str) -> Generator[_Topic]:
@@ -141,5 +170,8 @@ class EventHub:
                     self._changed(sid, revision)
 
 
-def _event(name: str, revision: int, data: object) -> bytes:
-    return b"id: %d\nevent: %s\ndata: %s\n\n" % (revision, name.encode(), orjson.dumps(data))
+def _in_stream(event: SessionEvent) -> bytes:
+    if event.name == "quiet":
+        return b": still here\n\n"
+    data = {"revision": event.newest} if event.edit is None else event.edit.model_dump(mode="json")
+    return b"id: %d\nevent: %s\ndata: %s\n\n" % (event.revision, event.name.encode(), orjson.dumps(data))
