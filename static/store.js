@@ -1,0 +1,174 @@
+/**
+ * What the page knows: the session as the server last told it, and the view, which is the page's own.
+ *
+ * Views read these signals and call `actions`; they never talk to the server themselves.
+ */
+
+import { computed, signal } from "./lib/view.js";
+
+/** @typedef {import("./api-types.js").components["schemas"]} Schemas */
+/** @typedef {Schemas["SessionJson"]} Session */
+/** @typedef {Schemas["BoxAnswer"]} Box */
+/** @typedef {Schemas["ClassAnswer"]} ObjectClass */
+/** @typedef {Schemas["EditJson"]} Edit */
+/** @typedef {Schemas["CameraJson"]} Camera */
+/** @typedef {Schemas["ExportJson"]} Export */
+/** @typedef {{position: [number, number, number], wxyz: [number, number, number, number]}} Transform */
+
+/**
+ * A box's place and size while it is dragged or typed; nothing of it is stored yet.
+ * @typedef {object} BoxPreview
+ * @property {number} box_id
+ * @property {Transform} T_world_box
+ * @property {[number, number, number]} size metres
+ */
+
+/** @typedef {"scene" | "frame" | "export"} Mode */
+/** @typedef {"select" | "move" | "rotate" | "resize" | "points"} Tool */
+
+/**
+ * Someone at this session; `own`: this very page.
+ * @typedef {{view: string, author: string, name: string, frame: number | null, selected: number | null, mode: string, own: boolean}} Person
+ */
+
+/**
+ * An edit of ours that met somebody else's.
+ * @typedef {object} Conflict
+ * @property {number} box_id
+ * @property {string} detail
+ * @property {BoxPreview} yours
+ * @property {Box | null} current as it is now; null: deleted
+ */
+
+/** The session's id; empty on the sessions page. */
+export const sid = signal("");
+export const session = signal(/** @type {Session | null} */ (null));
+export const boxes = signal(/** @type {ReadonlyMap<number, Box>} */ (new Map()));
+export const classes = signal(/** @type {ReadonlyMap<number, ObjectClass>} */ (new Map()));
+/** The newest revision that this page has been told of. */
+export const revision = signal(0);
+/** Changes of this page that the server has not confirmed yet. */
+export const unsaved = signal(0);
+/** The line to the server: events come, and edits of others are seen, only while it is open. */
+export const line = signal(/** @type {"connecting" | "open" | "lost"} */ ("connecting"));
+export const people = signal(/** @type {Person[]} */ ([]));
+/** The box being dragged or typed, here or in another browser. */
+export const preview = signal(/** @type {BoxPreview | null} */ (null));
+/** What a drag changes, for beside the pointer; x and y in CSS pixels of the scene. */
+export const dragged = signal(/** @type {{text: string, x: number, y: number} | null} */ (null));
+export const conflict = signal(/** @type {Conflict | null} */ (null));
+/** What went wrong, by the place where it is shown: "page", "scene", "boxes", "box:12", "export", … */
+export const problems = signal(/** @type {ReadonlyMap<string, string>} */ (new Map()));
+
+// The view.
+export const mode = signal(/** @type {Mode} */ ("scene"));
+export const frame = signal(0);
+export const selected = signal(/** @type {number | null} */ (null));
+export const tool = signal(/** @type {Tool} */ ("select"));
+export const axes = signal(/** @type {"box" | "world"} */ ("box"));
+/** Metres; 0: off. */
+export const snapLength = signal(0);
+/** Degrees; 0: off. */
+export const snapAngle = signal(0);
+export const upright = signal(false);
+export const hidden = signal(/** @type {ReadonlySet<number>} */ (new Set()));
+/** How much of the photo is seen over the 3D, 0 to 1. */
+export const blend = signal(1);
+/** Of the photo in frame mode. */
+export const zoom = signal(1);
+/** What lies over everything: the key list, the palette, the contact sheet. */
+export const overlay = signal(/** @type {"help" | "palette" | "contact-sheet" | null} */ (null));
+export const sidePanel = signal(/** @type {"boxes" | "history"} */ ("boxes"));
+/** How far "jump" goes. */
+export const jump = signal(10);
+export const theme = signal(/** @type {"dark" | "light"} */ ("dark"));
+
+export const frames = computed(() => session.value?.frames ?? 0);
+/** The boxes as they are seen: with the preview in the place of what is stored. */
+export const shownBoxes = computed(() => {
+  const now = preview.value;
+  const stored = now === null ? undefined : boxes.value.get(now.box_id);
+  if (now === null || stored === undefined) return boxes.value;
+  return new Map(boxes.value).set(now.box_id, { ...stored, T_world_box: now.T_world_box, size: now.size });
+});
+export const selectedBox = computed(() =>
+  selected.value === null ? null : (shownBoxes.value.get(selected.value) ?? null),
+);
+
+/** @param {string} place @param {string | null} text null: nothing is wrong there any more */
+export function setProblem(place, text) {
+  const next = new Map(problems.value);
+  if (text === null) next.delete(place);
+  else next.set(place, text);
+  problems.value = next;
+}
+
+/**
+ * What views can ask for. Promises reject with an ApiError, whose message is written to be shown in place.
+ * Those that change the session resolve when the server has stored the change.
+ *
+ * @typedef {object} Actions
+ *
+ * @property {(id: number, changes: Partial<Pick<Box, "class_id" | "name" | "locked" | "T_world_box" | "size">>) => Promise<void>} changeBox
+ * @property {(id: number, place: {T_world_box: Transform, size: [number, number, number]}) => void} editBox
+ *   shown at once, everywhere; stored once nothing more came for a moment: for held keys and stepped fields
+ * @property {() => Promise<void>} finishEdit store now what `editBox` holds back
+ * @property {(translate: [number, number, number], rotate: [number, number, number]) => void} nudge
+ *   the selected box by metres and degrees along the axes that are set
+ * @property {(id: number) => Promise<void>} deleteBox
+ * @property {(id: number) => Promise<void>} duplicateBox the copy is then selected
+ * @property {(id: number) => Promise<void>} restOnGround
+ * @property {(classId: number) => void} newBox where the view looks at; it is then selected
+ * @property {(classId: number, points: [number, number, number][]) => Promise<number>} boxFromPoints
+ *   through four corners in the world; answers the angle in degrees by which the edges were set right
+ * @property {(observations: {frame: number, x: number, y: number}[]) => Promise<Schemas["PointAnswer"]>} locatePoint
+ * @property {(of: {frame: number, x: number, y: number}, frame: number) => Promise<[number, number][][]>} epipolar
+ *   where a point seen in one frame may be in another: polylines in image coordinates
+ * @property {(name: string) => Promise<ObjectClass>} addClass
+ * @property {(id: number, changes: {name?: string, color?: string, default_size?: [number, number, number] | null}) => Promise<void>} changeClass
+ * @property {(id: number) => Promise<void>} deleteClass
+ * @property {(yours: BoxPreview) => Promise<void>} overrule store our side of a conflict after all
+ * @property {() => Promise<void>} undo
+ * @property {() => Promise<void>} redo
+ * @property {(before?: number) => Promise<Schemas["HistoryPage"]>} history
+ * @property {(name: string) => Promise<void>} renameSession
+ *
+ * @property {(index: number) => void} goTo a frame; held within the recording
+ * @property {(index?: number) => void} enterFrame
+ * @property {() => void} leaveFrame
+ * @property {(at: "all" | "selected" | "frame") => void} look
+ * @property {(id: number | null) => void} select
+ * @property {(id: number) => Promise<Schemas["TellingFrame"][]>} tellingFrames
+ * @property {(boxes: {T_world_box: Transform, size: [number, number, number]}[], frames: number[]) => Promise<Schemas["FramePreview"][]>} labelsOf
+ * @property {(index: number) => Promise<Schemas["LabelJson"][]>} frameLabels
+ * @property {(index: number, options?: {width?: number, crop?: [number, number, number, number]}) => string} imageAddress
+ * @property {(index: number) => Promise<string>} frameName
+ * @property {() => Promise<Camera[]>} cameras
+ * @property {(index: number) => Promise<Camera>} cameraOf a frame
+ *
+ * @property {() => Promise<Schemas["FormatsAnswer"]>} formats
+ * @property {(format: string, options: object, signal?: AbortSignal) => Promise<Schemas["ExportPreview"]>} previewExport
+ * @property {(format: string, options: object) => Promise<Export>} startExport
+ * @property {() => Promise<Export[]>} exports
+ * @property {(id: string) => Promise<Export>} exportState
+ * @property {(id: string) => Promise<Export>} cancelExport
+ * @property {(id: string) => Promise<void>} removeExport
+ * @property {(id: string) => string} downloadAddress
+ *
+ * @property {() => Promise<Session[]>} sessions
+ * @property {(session: Session, name: string) => Promise<Session>} renameOf
+ * @property {(session: Session) => Promise<void>} deleteSession
+ * @property {(id: string) => Promise<Session>} restoreSession
+ * @property {(id: string, width: number) => string} thumbnailAddress of a session
+ * @property {() => Promise<Schemas["RootJson"][]>} roots
+ * @property {(root: string, path: string) => Promise<Schemas["FolderPage"]>} folders
+ * @property {(source: object) => Promise<Schemas["LookAnswer"]>} lookAtRecording
+ * @property {(source: object, index: number, width: number) => string} lookImageAddress
+ * @property {(file: File, onProgress: (sent: number, total: number) => void, signal?: AbortSignal) => Promise<Schemas["UploadAnswer"]>} upload
+ * @property {(draft: object) => Promise<Schemas["ImportJson"]>} startImport
+ * @property {(id: string) => Promise<Schemas["ImportJson"]>} importState
+ * @property {(id: string) => Promise<Schemas["ImportJson"]>} cancelImport
+ */
+
+/** Filled in by main.js, which knows the server. */
+export const actions = /** @type {Actions} */ ({});
