@@ -1,73 +1,287 @@
-// @ts-check
 /** The only module that talks to the server. */
 
-/**
- * @typedef {object} Session
- * @property {string} id
- * @property {string} name
- * @property {number} revision
- * @property {string} format
- * @property {number} frames
- * @property {number} classes
- * @property {number} boxes
- * @property {number} skipped
- * @property {string} changed
- */
+/** @typedef {import("./store.js").Schemas} Schemas */
+/** @typedef {import("./store.js").Box} Box */
 
 /** What went wrong, in the server's words: they are written to be shown. */
 export class ApiError extends Error {
   /**
    * @param {string} message
    * @param {number} status the HTTP status; 0: the server did not answer
+   * @param {unknown} [current] of a conflict: the thing as it is now
    */
-  constructor(message, status) {
+  constructor(message, status, current = undefined) {
     super(message);
     this.status = status;
+    this.current = current;
   }
 }
 
-/** @returns {Promise<Session[]>} */
-export function sessions() {
-  return request("/api/sessions");
-}
-
-/** @returns {Promise<{version: string}>} */
-export function health() {
-  return request("/api/health");
-}
+/** @returns {Promise<Schemas["HealthJson"]>} */
+export const health = () => request("GET", "/api/health");
 
 /**
  * Trade the token for the cookie.
  * @param {string} token
  * @returns {Promise<void>}
  */
-export function logIn(token) {
-  return request("/login", { method: "POST", body: JSON.stringify({ token }) });
-}
+export const logIn = (token) => request("POST", "/login", { body: { token } });
+
+// Sessions.
+
+/** @returns {Promise<Schemas["SessionJson"][]>} */
+export const sessions = () => request("GET", "/api/sessions");
+
+/** @param {string} sid @returns {Promise<Schemas["SessionJson"]>} */
+export const session = (sid) => request("GET", under(sid, ""));
+
+/** @param {string} sid @param {number} revision @param {string} name @returns {Promise<Schemas["SessionJson"]>} */
+export const renameSession = (sid, revision, name) => request("PATCH", under(sid, ""), { revision, body: { name } });
+
+/** @param {string} sid @param {number} revision @returns {Promise<void>} */
+export const deleteSession = (sid, revision) => request("DELETE", under(sid, ""), { revision });
+
+/** @param {string} sid @returns {Promise<Schemas["SessionJson"]>} */
+export const restoreSession = (sid) => request("POST", under(sid, "/restore"), { key: true });
+
+/** @param {string} sid @returns {Promise<Schemas["SkippedFrameJson"][]>} */
+export const skipped = (sid) => request("GET", under(sid, "/skipped"));
+
+// Recordings to import.
+
+/** @returns {Promise<Schemas["RootJson"][]>} */
+export const roots = () => request("GET", "/api/roots");
+
+/** @param {string} root @param {string} path @returns {Promise<Schemas["FolderPage"]>} */
+export const folders = (root, path) => request("GET", `/api/roots/${encodeURIComponent(root)}/folders?${query({ path })}`);
+
+/** @param {object} source {root, path, format?} or {upload, format?} @returns {Promise<Schemas["LookAnswer"]>} */
+export const lookAtRecording = (source) => request("POST", "/api/imports/look", { body: source });
 
 /**
- * The address of a frame's image, no wider than `width` pixels.
- * @param {string} session
+ * The address of a frame's picture before it is imported.
+ * @param {object} source as for lookAtRecording
  * @param {number} index
  * @param {number} width
  */
-export function imageAddress(session, index, width) {
-  return `/api/sessions/${encodeURIComponent(session)}/frames/${index}/image?width=${width}`;
+export const lookImageAddress = (source, index, width) => `/api/imports/look/image?${query({ ...source, index, width })}`;
+
+/** @param {object} draft @returns {Promise<Schemas["ImportJson"]>} */
+export const startImport = (draft) => request("POST", "/api/imports", { body: draft, key: true });
+
+/** @param {string} id @returns {Promise<Schemas["ImportJson"]>} */
+export const importState = (id) => request("GET", `/api/imports/${encodeURIComponent(id)}`);
+
+/** @param {string} id @returns {Promise<Schemas["ImportJson"]>} */
+export const cancelImport = (id) => request("POST", `/api/imports/${encodeURIComponent(id)}/cancel`);
+
+/**
+ * Send a zip. Not by fetch, which does not tell how much is sent.
+ * @param {File} file
+ * @param {(sent: number, total: number) => void} onProgress
+ * @param {AbortSignal} [signal]
+ * @returns {Promise<Schemas["UploadAnswer"]>}
+ */
+export function upload(file, onProgress, signal) {
+  return new Promise((resolve, reject) => {
+    const sending = new XMLHttpRequest();
+    sending.open("POST", "/api/imports/uploads");
+    sending.responseType = "json";
+    sending.upload.onprogress = (event) => onProgress(event.loaded, event.lengthComputable ? event.total : file.size);
+    sending.onload = () =>
+      sending.status >= 200 && sending.status < 300 ? resolve(sending.response) : reject(failure(sending.status, sending.response));
+    sending.onerror = () => reject(new ApiError(`${file.name} could not be sent: the server does not answer.`, 0));
+    sending.onabort = () => reject(new ApiError("Cancelled.", 0));
+    signal?.addEventListener("abort", () => sending.abort(), { once: true });
+    const form = new FormData();
+    form.append("file", file, file.name);
+    sending.send(form);
+  });
+}
+
+// Boxes and classes.
+
+/** @param {string} sid @returns {Promise<Box[]>} */
+export const boxes = (sid) => request("GET", under(sid, "/boxes"));
+
+/** @param {string} sid @returns {Promise<Schemas["ClassAnswer"][]>} */
+export const classes = (sid) => request("GET", under(sid, "/classes"));
+
+/** @param {string} sid @param {number} id @param {number} revision @param {object} changes @returns {Promise<Box>} */
+export const changeBox = (sid, id, revision, changes) => request("PATCH", under(sid, `/boxes/${id}`), { revision, body: changes });
+
+/** @param {string} sid @param {number} id @param {number} revision @returns {Promise<void>} */
+export const deleteBox = (sid, id, revision) => request("DELETE", under(sid, `/boxes/${id}`), { revision });
+
+/** @param {string} sid @param {number} id @returns {Promise<Box>} */
+export const duplicateBox = (sid, id) => request("POST", under(sid, `/boxes/${id}/duplicate`), { body: {}, key: true });
+
+/** @param {string} sid @param {number} id @param {number} revision @returns {Promise<Box>} */
+export const restOnGround = (sid, id, revision) => request("POST", under(sid, `/boxes/${id}/to-ground`), { revision });
+
+/**
+ * @param {string} sid @param {number} classId @param {[number, number, number][]} points in the world
+ * @returns {Promise<Schemas["BoxFromPointsAnswer"]>}
+ */
+export const boxFromPoints = (sid, classId, points) =>
+  request("POST", under(sid, "/boxes/from-points"), { body: { class_id: classId, points, frame_of: "world" }, key: true });
+
+/** @param {string} sid @param {string} name @returns {Promise<Schemas["ClassAnswer"]>} */
+export const addClass = (sid, name) => request("POST", under(sid, "/classes"), { body: { name }, key: true });
+
+/** @param {string} sid @param {number} id @param {number} revision @param {object} changes @returns {Promise<Schemas["ClassAnswer"]>} */
+export const changeClass = (sid, id, revision, changes) => request("PATCH", under(sid, `/classes/${id}`), { revision, body: changes });
+
+/** @param {string} sid @param {number} id @param {number} revision @returns {Promise<void>} */
+export const deleteClass = (sid, id, revision) => request("DELETE", under(sid, `/classes/${id}`), { revision });
+
+/** @param {string} sid @returns {Promise<Schemas["EditJson"]>} */
+export const undo = (sid) => request("POST", under(sid, "/undo"), { key: true });
+
+/** @param {string} sid @returns {Promise<Schemas["EditJson"]>} */
+export const redo = (sid) => request("POST", under(sid, "/redo"), { key: true });
+
+/** @param {string} sid @param {number} [before] @returns {Promise<Schemas["HistoryPage"]>} */
+export const history = (sid, before) => request("GET", under(sid, `/history?${query({ limit: 50, before })}`));
+
+// Frames, and what the boxes look like in them.
+
+/** @param {string} sid @returns {Promise<Schemas["CameraJson"][]>} */
+export const cameras = (sid) => request("GET", under(sid, "/cameras"));
+
+/** @param {string} sid @param {number} offset @param {number} limit @returns {Promise<Schemas["FramePage"]>} */
+export const frames = (sid, offset, limit) => request("GET", under(sid, `/frames?${query({ offset, limit })}`));
+
+/** @param {string} sid @param {number} index @returns {Promise<Schemas["LabelJson"][]>} */
+export const frameLabels = (sid, index) => request("GET", under(sid, `/frames/${index}/labels?shape=box`));
+
+/**
+ * @param {string} sid
+ * @param {{T_world_box: object, size: number[]}[]} boxes
+ * @param {number[]} frames
+ * @returns {Promise<Schemas["FramePreview"][]>}
+ */
+export const labelsOf = (sid, boxes, frames) => request("POST", under(sid, "/labels"), { body: { boxes, frames } });
+
+/** @param {string} sid @param {number} id @returns {Promise<Schemas["TellingFrame"][]>} */
+export const tellingFrames = (sid, id) => request("GET", under(sid, `/boxes/${id}/telling-frames?count=6`));
+
+/** @param {string} sid @param {{frame: number, x: number, y: number}[]} observations @returns {Promise<Schemas["PointAnswer"]>} */
+export const locatePoint = (sid, observations) => request("POST", under(sid, "/points"), { body: { observations } });
+
+/**
+ * @param {string} sid @param {{frame: number, x: number, y: number}} of @param {number} frame
+ * @returns {Promise<[number, number][][]>}
+ */
+export const epipolar = (sid, of, frame) =>
+  request("GET", under(sid, `/frames/${frame}/epipolar?${query({ of: of.frame, x: of.x, y: of.y })}`));
+
+/**
+ * The address of a frame's image: at most `width` pixels wide, or only `crop` (x0, y0, x1, y1 in the original).
+ * @param {string} sid
+ * @param {number} index
+ * @param {{width?: number, crop?: [number, number, number, number]}} [options]
+ */
+export const imageAddress = (sid, index, options = {}) =>
+  under(sid, `/frames/${index}/image?${query({ width: options.width, crop: options.crop?.join(",") })}`);
+
+// Exports.
+
+/** @returns {Promise<Schemas["FormatsAnswer"]>} */
+export const formats = () => request("GET", "/api/formats");
+
+/** @param {string} sid @param {string} format @param {object} options @param {AbortSignal} [signal] @returns {Promise<Schemas["ExportPreview"]>} */
+export const previewExport = (sid, format, options, signal) =>
+  request("POST", under(sid, "/exports/preview"), { body: { format, options }, signal });
+
+/** @param {string} sid @param {string} format @param {object} options @returns {Promise<Schemas["ExportJson"]>} */
+export const startExport = (sid, format, options) => request("POST", under(sid, "/exports"), { body: { format, options }, key: true });
+
+/** @param {string} sid @returns {Promise<Schemas["ExportJson"][]>} */
+export const exports = (sid) => request("GET", under(sid, "/exports"));
+
+/** @param {string} id @returns {Promise<Schemas["ExportJson"]>} */
+export const exportState = (id) => request("GET", `/api/exports/${encodeURIComponent(id)}`);
+
+/** @param {string} id @returns {Promise<Schemas["ExportJson"]>} */
+export const cancelExport = (id) => request("POST", `/api/exports/${encodeURIComponent(id)}/cancel`);
+
+/** @param {string} id @returns {Promise<void>} */
+export const removeExport = (id) => request("DELETE", `/api/exports/${encodeURIComponent(id)}`);
+
+/** @param {string} id */
+export const downloadAddress = (id) => `/api/exports/${encodeURIComponent(id)}/download`;
+
+// The live line.
+
+/**
+ * A line that carries the session's edits to the page and the page's view to the scene.
+ * @param {string} sid
+ * @param {string} view the page's own name, 32 hex digits
+ * @param {number} after the newest revision that the page has
+ * @param {{opened: () => void, message: (message: any) => void, closed: (code: number, reason: string) => void}} on
+ * @returns {{send: (message: object) => void, close: () => void}}
+ */
+export function openLine(sid, view, after, on) {
+  const scheme = location.protocol === "https:" ? "wss" : "ws";
+  const socket = new WebSocket(`${scheme}://${location.host}${under(sid, `/live?${query({ view, after })}`)}`);
+  socket.onopen = () => on.opened();
+  socket.onmessage = (event) => on.message(JSON.parse(event.data));
+  socket.onclose = (event) => on.closed(event.code, event.reason);
+  return {
+    send: (message) => {
+      if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
+    },
+    close: () => socket.close(),
+  };
+}
+
+/** @param {string} sid @param {string} rest */
+function under(sid, rest) {
+  return `/api/sessions/${encodeURIComponent(sid)}${rest}`;
+}
+
+/** @param {Record<string, unknown>} values those that are undefined are left out */
+function query(values) {
+  const known = Object.entries(values).filter(([, value]) => value !== undefined);
+  return new URLSearchParams(known.map(([name, value]) => [name, String(value)])).toString();
 }
 
 /**
+ * @param {string} method
  * @param {string} address
- * @param {RequestInit} [options]
+ * @param {{body?: object, revision?: number, key?: boolean, signal?: AbortSignal}} [options] `revision`: what the
+ *   change was made to; `key`: a repeat after a lost answer must not do it twice
  * @returns {Promise<any>}
  */
-async function request(address, options) {
+async function request(method, address, { body, revision, key, signal } = {}) {
+  /** @type {Record<string, string>} */
+  const headers = {};
+  if (body !== undefined) headers["Content-Type"] = "application/json";
+  if (revision !== undefined) headers["If-Match"] = `"${revision}"`;
+  if (key) headers["Idempotency-Key"] = randomName();
+  const send = () => fetch(address, { method, headers, body: body && JSON.stringify(body), signal });
   let response;
   try {
-    response = await fetch(address, { headers: { "Content-Type": "application/json" }, ...options });
-  } catch {
+    response = await send().catch((error) => {
+      // An answer that was lost on the way: the key lets the server tell a repeat from a second wish.
+      if (key && error.name !== "AbortError") return send();
+      throw error;
+    });
+  } catch (error) {
+    if (error instanceof DOMException && error.name === "AbortError") throw error;
     throw new ApiError("The server does not answer. Is it still running?", 0);
   }
   if (response.ok) return response.status === 204 ? undefined : response.json();
-  const problem = await response.json().catch(() => ({}));
-  throw new ApiError(problem.detail ?? `The server answered ${response.status}.`, response.status);
+  throw failure(response.status, await response.json().catch(() => ({})));
+}
+
+/** @param {number} status @param {any} problem */
+function failure(status, problem) {
+  return new ApiError(problem?.detail ?? `The server answered ${status}.`, status, problem?.current);
+}
+
+/** 32 hex digits; not crypto.randomUUID, which plain http on a lab's network does not have. */
+export function randomName() {
+  return Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16).padStart(2, "0")).join("");
 }
