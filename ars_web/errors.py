@@ -5,6 +5,7 @@ ArsError                  the root; its message names the value, what is wrong w
 │   └── BadFile           the same, in a file: the message begins with `FILE:LINE:` or `FILE:`
 ├── NotFound              a session, a frame, a box, a class or an export that is not there
 ├── Conflict              the thing was changed meanwhile; `current` holds what it is now
+├── Locked                the thing is kept as it is until someone unlocks it
 ├── RefusedPath           a path that leaves its root, or cannot be one
 ├── TooLarge              an upload, an archive or an image beyond its limit
 ├── Cancelled             work stopped because someone asked for it
@@ -60,6 +61,10 @@ class Conflict(ArsError):
     def __init__(self, message: str, *, current: object = None) -> None:
         super().__init__(message)
         self.current = current
+
+
+class Locked(ArsError):
+    """A thing that someone locked, so that it stays as it is; the message says what to unlock."""
 
 
 class RefusedPath(ArsError):

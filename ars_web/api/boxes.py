@@ -7,7 +7,7 @@ from fastapi import APIRouter, Response
 from jaxtyping import Float
 
 from ars_web.api.dependencies import AuthorDep, ExpectedRevision, IdempotencyKey, ServicesDep, StrictRoute, etag
-from ars_web.api.models import BoxAnswer, BoxFromPointsAnswer, PointsDraft
+from ars_web.api.models import BoxAnswer, BoxFromPointsAnswer, DuplicateDraft, PointsDraft
 from ars_web.api.problems import documented
 from ars_web.errors import BadInput, NotFound
 from ars_web.geometry.box import from_four_points
@@ -17,6 +17,8 @@ from ars_web.sessions.model import VirtualBox
 from ars_web.sessions.store import SessionStore
 
 router = APIRouter(prefix="/api/sessions/{sid}/boxes", tags=["boxes"], route_class=StrictRoute)
+
+BESIDE = DuplicateDraft()  # pyright: ignore[reportCallIssue]: it knows no defaults behind Annotated
 
 
 @router.get("", operation_id="boxes-list", responses=documented(404))
@@ -33,7 +35,9 @@ def create(
 ) -> BoxAnswer:
     """Add a box."""
     box = draft.draft
-    made = services.editor.add_box(sid, class_id=box.class_id, box=box.box, name=box.name, author=author, key=key)
+    made = services.editor.add_box(
+        sid, class_id=box.class_id, box=box.box, name=box.name, locked=box.locked, author=author, key=key
+    )
     _headers(response, sid, made, created=True)
     return BoxAnswer.of(made)
 
@@ -62,7 +66,7 @@ def get(sid: str, box_id: int, response: Response, services: ServicesDep) -> Box
     return BoxAnswer.of(found)
 
 
-@router.patch("/{box_id}", operation_id="boxes-change", responses=documented(404, 412, 413, 428))
+@router.patch("/{box_id}", operation_id="boxes-change", responses=documented(404, 409, 412, 413, 428))
 def change(
     sid: str,
     box_id: int,
@@ -72,7 +76,10 @@ def change(
     author: AuthorDep,
     expected: ExpectedRevision,
 ) -> BoxAnswer:
-    """Change a box that is at the revision in `If-Match`."""
+    """Change a box that is at the revision in `If-Match`.
+
+    A locked box answers 409 (`locked`), unless only its name changes or it is unlocked with the same request.
+    """
     after = services.editor.change_box(
         sid,
         box_id,
@@ -81,16 +88,49 @@ def change(
         T_world_box=None if changes.T_world_box is None else changes.T_world_box.matrix,
         size=None if changes.size is None else np.array(changes.size),
         name=changes.name,
+        locked=changes.locked,
         author=author,
     )
     _headers(response, sid, after)
     return BoxAnswer.of(after)
 
 
-@router.delete("/{box_id}", status_code=204, operation_id="boxes-delete", responses=documented(404, 412, 428))
+@router.delete("/{box_id}", status_code=204, operation_id="boxes-delete", responses=documented(404, 409, 412, 428))
 def delete(sid: str, box_id: int, services: ServicesDep, author: AuthorDep, expected: ExpectedRevision) -> None:
-    """Delete a box that is at the revision in `If-Match`; undo brings it back."""
+    """Delete a box that is at the revision in `If-Match`, unless it is locked; undo brings it back."""
     services.editor.delete_box(sid, box_id, expected_revision=expected, author=author)
+
+
+@router.post("/{box_id}/duplicate", status_code=201, operation_id="boxes-duplicate", responses=documented(404, 413))
+def duplicate(
+    sid: str,
+    box_id: int,
+    response: Response,
+    services: ServicesDep,
+    author: AuthorDep,
+    key: IdempotencyKey,
+    draft: DuplicateDraft = BESIDE,
+) -> BoxAnswer:
+    """Add a box like another, next to it, with the next free name; it is not locked."""
+    made = services.editor.duplicate_box(sid, box_id, author=author, key=key)
+    _headers(response, sid, made, created=True)
+    return BoxAnswer.of(made)
+
+
+@router.post("/{box_id}/to-ground", operation_id="boxes-to-ground", responses=documented(404, 409, 412, 428))
+def to_ground(
+    sid: str,
+    box_id: int,
+    response: Response,
+    services: ServicesDep,
+    author: AuthorDep,
+    expected: ExpectedRevision,
+    key: IdempotencyKey,
+) -> BoxAnswer:
+    """Move a box that is at the revision in `If-Match` up or down until its lowest corner is at z = 0."""
+    after = services.editor.rest_on_ground(sid, box_id, expected_revision=expected, author=author, key=key)
+    _headers(response, sid, after)
+    return BoxAnswer.of(after)
 
 
 def _headers(response: Response, sid: str, box: VirtualBox, *, created: bool = False) -> None:

@@ -6,6 +6,7 @@ from ars_web.api.dependencies import AuthorDep, ExpectedRevision, IdempotencyKey
 from ars_web.api.models import ClassAnswer, ClassDraft, ClassPatch
 from ars_web.api.problems import documented
 from ars_web.errors import NotFound
+from ars_web.sessions.editing import UNSET
 
 router = APIRouter(prefix="/api/sessions/{sid}/classes", tags=["classes"], route_class=StrictRoute)
 
@@ -23,7 +24,9 @@ def create(
     sid: str, draft: ClassDraft, response: Response, services: ServicesDep, author: AuthorDep, key: IdempotencyKey
 ) -> ClassAnswer:
     """Add a class."""
-    made = services.editor.add_class(sid, name=draft.name, color=draft.color, author=author, key=key)
+    made = services.editor.add_class(
+        sid, name=draft.name, color=draft.color, default_size=draft.default_size, author=author, key=key
+    )
     response.headers["Location"] = f"/api/sessions/{sid}/classes/{made.id}"
     response.headers["ETag"] = etag(made.revision)
     return ClassAnswer.of(made)
@@ -49,9 +52,15 @@ def change(
     author: AuthorDep,
     expected: ExpectedRevision,
 ) -> ClassAnswer:
-    """Change the name or the colour of a class that is at the revision in `If-Match`."""
+    """Change a class that is at the revision in `If-Match`."""
     after = services.editor.change_class(
-        sid, class_id, expected_revision=expected, name=changes.name, color=changes.color, author=author
+        sid,
+        class_id,
+        expected_revision=expected,
+        name=changes.name,
+        color=changes.color,
+        default_size=changes.default_size if "default_size" in changes.model_fields_set else UNSET,
+        author=author,
     )
     response.headers["ETag"] = etag(after.revision)
     return ClassAnswer.of(after)

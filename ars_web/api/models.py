@@ -20,7 +20,7 @@ from ars_web.datasets.samples import FrameLabel
 from ars_web.geometry.camera import Camera
 from ars_web.geometry.rigid_transform import wxyz_from_rotation
 from ars_web.recordings.registry import READERS
-from ars_web.sessions.boxes_json import Id, box_json, class_json
+from ars_web.sessions.boxes_json import Id, Size, box_json, class_json
 from ars_web.sessions.edits import BoxChange, Change, ClassChange, Edit
 from ars_web.sessions.model import FrameTable, ObjectClass, SessionSummary, VirtualBox
 from ars_web.sessions.names import LONGEST_NAME
@@ -119,6 +119,7 @@ class ClassDraft(Strict):
 
     name: Name
     color: Color | None = Field(None, description="#rrggbb; absent: the next of the palette")
+    default_size: Size | None = Field(None, description="metres, of new boxes of this class; absent: not set")
 
 
 class ClassPatch(Strict):
@@ -126,6 +127,7 @@ class ClassPatch(Strict):
 
     name: Name | None = None
     color: Color | None = None
+    default_size: Size | None = Field(None, description="null: not set any more")
 
 
 class TransformAnswer(BaseModel):
@@ -141,6 +143,9 @@ class ClassAnswer(BaseModel):
     id: int = Field(description="never shifts, never used again")
     name: str
     color: str = Field(description="#rrggbb")
+    default_size: tuple[float, float, float] | None = Field(
+        description="metres, of new boxes of this class; null: not set"
+    )
     revision: int = Field(description="the session's revision that last changed it")
 
     @classmethod
@@ -158,6 +163,7 @@ class BoxAnswer(BaseModel):
     T_world_box: TransformAnswer = Field(description="the box's centre and axes in the world")
     size: tuple[float, float, float] = Field(description="metres along the box's own axes")
     has_hull: bool = Field(description="whether a visual hull is stored with it")
+    locked: bool = Field(description="class, place and size stay, and it is not deleted, until it is unlocked")
     revision: int = Field(description="the session's revision that last changed it")
 
     @classmethod
@@ -176,6 +182,12 @@ class PointsDraft(Strict):
     frame_of: Literal["world", "camera"] = Field(description="whose coordinates the points are in")
     frame: Id | None = Field(None, description="the frame's index, where frame_of is camera")
     name: Name | None = None
+
+
+class DuplicateDraft(Strict):
+    """Where the copy of a box goes."""
+
+    offset: Literal["beside"] = Field("beside", description="10 mm from the box, along its own x")
 
 
 class BoxFromPointsAnswer(BoxAnswer):

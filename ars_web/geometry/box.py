@@ -8,6 +8,7 @@ from itertools import product
 
 import numpy as np
 from jaxtyping import Float, Int
+from numpy.typing import ArrayLike
 
 from ars_web.errors import BadInput
 from ars_web.geometry import rigid_transform
@@ -42,15 +43,10 @@ class Box:
     def __post_init__(self) -> None:
         """Raises BadInput for a size that is not three positive finite lengths, or a transform that is none or leads
         further than FARTHEST."""
-        size = np.array(self.size, dtype=np.float64)
-        if size.shape != (3,) or not np.isfinite(size).all() or (size <= 0).any() or (size > LARGEST_SIZE).any():
-            raise BadInput(
-                f"a box's size must be three lengths in metres, each > 0, not {np.asarray(self.size).tolist()}"
-            )
+        size = checked_size(self.size)
         T = rigid_transform.checked(self.T_world_box)
         if (np.abs(T[:3, 3]) > FARTHEST).any():
             raise BadInput(f"a box must be within {FARTHEST:g} m of the world's origin, not at {T[:3, 3].tolist()}")
-        size.flags.writeable = False
         T.flags.writeable = False
         object.__setattr__(self, "size", size)
         object.__setattr__(self, "T_world_box", T)
@@ -64,6 +60,39 @@ class Box:
     def volume(self) -> float:
         """Cubic metres."""
         return float(np.prod(self.size))
+
+
+def checked_size(size: ArrayLike) -> Float[np.ndarray, "3"]:
+    """`size` as (3,), which nobody can write to.
+
+    Raises:
+        BadInput: it is not three lengths in metres, each > 0 and at most LARGEST_SIZE.
+    """
+    try:
+        checked = np.array(size, dtype=np.float64)
+    except (ValueError, TypeError) as error:
+        raise BadInput(f"a box's size must be three lengths in metres, not {size!r}") from error
+    if checked.shape != (3,) or not (np.isfinite(checked) & (checked > 0) & (checked <= LARGEST_SIZE)).all():
+        raise BadInput(
+            f"a box's size must be three lengths in metres, each > 0 and at most {LARGEST_SIZE:g},"
+            f" not {checked.tolist()}"
+        )
+    checked.flags.writeable = False
+    return checked
+
+
+def beside(box: Box, *, gap: float = 0.01) -> Box:
+    """A box of the same size and orientation next to `box`: along its own x, `gap` metres between the two."""
+    T = box.T_world_box.copy()
+    T[:3, 3] += T[:3, 0] * (box.size[0] + gap)
+    return Box(T, box.size)
+
+
+def resting_on_ground(box: Box) -> Box:
+    """`box` moved along the world's z until its lowest corner is at z = 0; its orientation stays."""
+    T = box.T_world_box.copy()
+    T[2, 3] -= box.corners_world[:, 2].min()
+    return Box(T, box.size)
 
 
 def stack(boxes: list[Box]) -> tuple[Float[np.ndarray, "b 4 4"], Float[np.ndarray, "b 3"]]:

@@ -21,6 +21,7 @@ Coordinate = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-1e9, l
 Component = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Length = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0, le=LARGEST_SIZE)]
 Size = tuple[Length, Length, Length]
+Flag = Annotated[bool, Field(strict=True)]
 Id = Annotated[int, Field(strict=True, ge=0)]
 Name = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME)]
 
@@ -56,10 +57,12 @@ class BoxJson(_Strict):
     size: Size = Field(description="metres along the box's own axes")
     name: Name | None = Field(None, description="default: the class's name, with a number where it is taken")
 
+    locked: Flag = Field(False, description="class, place and size stay, and it is not deleted, until it is unlocked")
+
     @property
     def draft(self) -> BoxDraft:
         """As `SessionEditor` takes it."""
-        return BoxDraft(self.class_id, Box(self.T_world_box.matrix, np.array(self.size)), self.name)
+        return BoxDraft(self.class_id, Box(self.T_world_box.matrix, np.array(self.size)), self.name, self.locked)
 
 
 class BoxPatchJson(_Strict):
@@ -69,6 +72,7 @@ class BoxPatchJson(_Strict):
     T_world_box: TransformJson | None = None
     size: Size | None = None
     name: Name | None = None
+    locked: Flag | None = None
 
 
 class BoxFileItem(BoxJson):
@@ -99,13 +103,20 @@ def box_json(box: VirtualBox) -> dict[str, Any]:
         "T_world_box": transform_json(box.box.T_world_box),
         "size": box.box.size.tolist(),
         "has_hull": box.has_hull,
+        "locked": box.locked,
         "revision": box.revision,
     }
 
 
 def class_json(a_class: ObjectClass) -> dict[str, Any]:
     """The class as the API answers it."""
-    return {"id": a_class.id, "name": a_class.name, "color": a_class.color, "revision": a_class.revision}
+    return {
+        "id": a_class.id,
+        "name": a_class.name,
+        "color": a_class.color,
+        "default_size": None if a_class.default_size is None else list(a_class.default_size),
+        "revision": a_class.revision,
+    }
 
 
 def read_boxes_file(path: Path) -> list[BoxDraft]:

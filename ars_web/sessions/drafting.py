@@ -2,21 +2,36 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from enum import Enum, auto
+from typing import Literal, TypeVar
 
 import numpy as np
 
-from ars_web.errors import BadInput, Conflict, NotFound
+from ars_web.errors import BadInput, Conflict, Locked, NotFound
 from ars_web.geometry.box import Box
 from ars_web.geometry.rigid_transform import Transform
+from ars_web.sessions.edits import same_content
 from ars_web.sessions.model import ObjectClass, SessionState, VirtualBox
 from ars_web.sessions.names import FreshNames, checked_name
+from ars_web.sessions.palette import checked_color
+from ars_web.sessions.sizes import checked_class_size
 
 T = TypeVar("T", VirtualBox, ObjectClass)
 
 SAME_PLACE = 1e-9
 """Metres, and entries of a rotation. A box that moves by less has not moved: a quaternion that was read from the
 API and is sent back is off by a rounding error."""
+
+
+class Unset(Enum):
+    """Says of an argument that it was not given, where None means something."""
+
+    UNSET = auto()
+
+
+UNSET: Literal[Unset.UNSET] = Unset.UNSET
+
+ClassSize = tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,27 +41,37 @@ class BoxDraft:
     class_id: int
     box: Box
     name: str | None = None
+    locked: bool = False
 
 
-def drafted(state: SessionState, drafts: Sequence[BoxDraft]) -> list[VirtualBox]:
-    """The boxes that the drafts become in the next revision, named and numbered.
+def drafted_box(state: SessionState, draft: BoxDraft) -> VirtualBox:
+    """The box that the draft becomes in the next revision, named and numbered.
 
     Raises:
-        BadInput: a class does not exist or a name cannot be used; among several, the message says which.
+        BadInput: its class does not exist or its name cannot be used.
     """
+    return _drafted(state, draft, state.next_box_id, FreshNames(box.name for box in state.boxes.values()))
+
+
+def drafted_boxes(state: SessionState, drafts: Sequence[BoxDraft]) -> list[VirtualBox]:
+    """The boxes that the drafts become; raises as `drafted_box` does, and says which box it is, from 0."""
     boxes: list[VirtualBox] = []
     names = FreshNames(box.name for box in state.boxes.values())
     for i, draft in enumerate(drafts):
         try:
-            a_class = existing_class(state, draft.class_id)
-            name = names.give(a_class.name) if draft.name is None else checked_name(draft.name, what="a box")
+            boxes.append(_drafted(state, draft, state.next_box_id + i, names))
         except BadInput as error:
-            raise error if len(drafts) == 1 else BadInput(f"box {i}: {error}") from error
-        names.take(name)
-        boxes.append(
-            VirtualBox(state.next_box_id + i, a_class.id, name, draft.box, has_hull=False, revision=state.revision + 1)
-        )
+            raise BadInput(f"box {i}: {error}") from error
     return boxes
+
+
+def _drafted(state: SessionState, draft: BoxDraft, box_id: int, names: FreshNames) -> VirtualBox:
+    a_class = existing_class(state, draft.class_id)
+    name = names.give(a_class.name) if draft.name is None else checked_name(draft.name, what="a box")
+    names.take(name)
+    return VirtualBox(
+        box_id, a_class.id, name, draft.box, has_hull=False, revision=state.revision + 1, locked=draft.locked
+    )
 
 
 def changed_box(
@@ -57,11 +82,13 @@ def changed_box(
     T_world_box: Transform | None,
     size: np.ndarray | None,
     name: str | None,
+    locked: bool | None,
 ) -> VirtualBox:
     """`before` with what is given in place, of the next revision; `before` itself where nothing differs.
 
     Raises:
         BadInput: a value cannot be a box's.
+        Locked: the box is locked, is not to be unlocked with this, and more than its name would change.
     """
     box = before.box
     asked = Box(
@@ -76,9 +103,52 @@ def changed_box(
         name=before.name if name is None else checked_name(name, what="a box"),
         box=Box(asked.T_world_box if moved else box.T_world_box, asked.size if resized else box.size),
         revision=state.revision + 1,
+        locked=before.locked if locked is None else locked,
     )
-    same = not moved and not resized and (after.class_id, after.name) == (before.class_id, before.name)
-    return before if same else after
+    if after.locked:
+        changes = {"class": after.class_id != before.class_id, "place": moved, "size": resized}
+        refuse_locked(before, *(what for what, is_so in changes.items() if is_so))
+    return before if same_content(before, after) else after
+
+
+def refuse_locked(box: VirtualBox, *changes: str) -> None:
+    """Refuse what a lock keeps from being changed: `class`, `place`, `size`, or `existence` for deletion.
+
+    Raises:
+        Locked: the box is locked and there are changes.
+    """
+    if box.locked and changes:
+        deleted = "existence" in changes
+        what = "it can be deleted" if deleted else f"its {' and '.join(changes)} can be changed"
+        raise Locked(f"box {box.id} ({box.name!r}) is locked: unlock it before {what}")
+
+
+def changed_class(
+    state: SessionState,
+    before: ObjectClass,
+    *,
+    name: str | None,
+    color: str | None,
+    default_size: ClassSize | Literal[Unset.UNSET] | None,
+) -> ObjectClass:
+    """`before` with what is given in place, of the next revision; `before` itself where nothing differs.
+
+    Raises:
+        BadInput: a value cannot be a class's.
+    """
+    after = replace(
+        before,
+        name=before.name if name is None else free_class_name(state, name, own_id=before.id),
+        color=before.color if color is None else checked_color(color),
+        default_size=before.default_size if default_size is UNSET else class_size(default_size),
+        revision=state.revision + 1,
+    )
+    return before if same_content(before, after) else after
+
+
+def class_size(size: ClassSize | None) -> ClassSize | None:
+    """A class's usual size, checked; None: nobody has said."""
+    return None if size is None else checked_class_size(size)
 
 
 def change_summary(before: VirtualBox, after: VirtualBox) -> str:
@@ -88,9 +158,20 @@ def change_summary(before: VirtualBox, after: VirtualBox) -> str:
         "Resize": not np.array_equal(before.box.size, after.box.size),
         "Rename": before.name != after.name,
         "Reclassify": before.class_id != after.class_id,
+        "Lock": after.locked and not before.locked,
+        "Unlock": before.locked and not after.locked,
     }
     verbs = [verb for verb, is_so in said.items() if is_so]
     return f"{verbs[0] if len(verbs) == 1 else 'Change'} {before.name}"
+
+
+def class_change_summary(before: ObjectClass, after: ObjectClass) -> str:
+    """One line for the history."""
+    if (before.name, before.color) != (after.name, after.color):
+        return f"Change class {before.name}"
+    if after.default_size is None:
+        return f"Clear size of {before.name}"
+    return f"Set size of {before.name} to {' x '.join(f'{1000 * length:g}' for length in after.default_size)} mm"
 
 
 def box_at(state: SessionState, box_id: int, expected_revision: int) -> VirtualBox:
@@ -104,6 +185,18 @@ def box_at(state: SessionState, box_id: int, expected_revision: int) -> VirtualB
     if box is None and not 0 < box_id < state.next_box_id:
         raise NotFound(f"there is no box {box_id} in this session")
     return _at_revision(box, f"box {box_id}", expected_revision)
+
+
+def existing_box(state: SessionState, box_id: int) -> VirtualBox:
+    """The box, at whatever revision.
+
+    Raises:
+        NotFound: there is none, or none any more.
+    """
+    if box_id not in state.boxes:
+        deleted = "was deleted from" if 0 < box_id < state.next_box_id else "is not in"
+        raise NotFound(f"box {box_id} {deleted} this session")
+    return state.boxes[box_id]
 
 
 def class_at(state: SessionState, class_id: int, expected_revision: int) -> ObjectClass:

@@ -14,6 +14,7 @@ from ars_web.sessions.edits import BoxChange, Change, ClassChange, NameChange
 from ars_web.sessions.model import ObjectClass, SessionState, VirtualBox
 from ars_web.sessions.names import checked_name
 from ars_web.sessions.palette import checked_color
+from ars_web.sessions.sizes import checked_class_size
 
 Json = dict[str, Any]
 
@@ -69,6 +70,18 @@ def state_from_json(text: str) -> SessionState:
         raise StoreError(f"the state that the session's log starts from cannot be read: {error}") from error
 
 
+def default_size_from_json(text: str) -> tuple[float, float, float]:
+    """A class's usual size from a JSON list.
+
+    Raises:
+        StoreError: it is not three lengths.
+    """
+    try:
+        return checked_class_size(orjson.loads(text))
+    except (ValueError, TypeError, ArsError) as error:
+        raise StoreError(f"a class's size in the session's database cannot be read: {error}") from error
+
+
 def request_digest(*parts: object) -> str:
     """A fingerprint of what a request asked for: equal for equal strings, numbers and arrays."""
     return hashlib.sha256(orjson.dumps(parts, option=orjson.OPT_SERIALIZE_NUMPY)).hexdigest()
@@ -122,7 +135,13 @@ def _change(item: Json) -> Change:
 
 
 def _class_json(a_class: ObjectClass) -> Json:
-    return {"id": a_class.id, "name": a_class.name, "color": a_class.color, "revision": a_class.revision}
+    return {
+        "id": a_class.id,
+        "name": a_class.name,
+        "color": a_class.color,
+        "revision": a_class.revision,
+        "default_size": a_class.default_size,
+    }
 
 
 def _class(item: Json) -> ObjectClass:
@@ -131,6 +150,8 @@ def _class(item: Json) -> ObjectClass:
         name=checked_name(item["name"], what="a class"),
         color=checked_color(item["color"]),
         revision=_whole(item, "revision"),
+        # Logs from before there were such sizes do not say.
+        default_size=None if item.get("default_size") is None else checked_class_size(item["default_size"]),
     )
 
 
@@ -145,6 +166,7 @@ def _box_json(box: VirtualBox) -> Json:
         "size": box.box.size.tolist(),
         "has_hull": box.has_hull,
         "revision": box.revision,
+        "locked": box.locked,
     }
 
 
@@ -159,6 +181,8 @@ def _box(item: Json) -> VirtualBox:
         box=Box(T, np.array(item["size"], dtype=np.float64)),
         has_hull=bool(item["has_hull"]),
         revision=_whole(item, "revision"),
+        # Logs from before there were locks do not say.
+        locked=bool(item.get("locked", False)),
     )
 
 

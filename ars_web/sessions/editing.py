@@ -6,34 +6,43 @@ session. A change that would leave everything as it is makes no edit and no revi
 
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from datetime import UTC, datetime
+from typing import Literal
 
 import numpy as np
 
 from ars_web.errors import BadInput, Conflict
-from ars_web.geometry.box import Box
+from ars_web.geometry.box import Box, beside, resting_on_ground
 from ars_web.geometry.rigid_transform import Transform
 from ars_web.sessions.drafting import (
+    UNSET,
     BoxDraft,
+    ClassSize,
+    Unset,
     box_at,
     change_summary,
     changed_box,
+    changed_class,
     class_at,
-    drafted,
+    class_change_summary,
+    class_size,
+    drafted_box,
+    drafted_boxes,
+    existing_box,
     free_class_name,
+    refuse_locked,
 )
 from ars_web.sessions.edit_json import request_digest
 from ars_web.sessions.edits import BoxChange, Change, ClassChange, Edit, NameChange, inverse, restated
 from ars_web.sessions.history import LogEntry, to_redo, to_undo
 from ars_web.sessions.listeners import Listener, Listeners
 from ars_web.sessions.model import ObjectClass, SessionSummary, VirtualBox
-from ars_web.sessions.names import checked_key, checked_name
+from ars_web.sessions.names import FreshNames, checked_key, checked_name
 from ars_web.sessions.palette import checked_color, next_color
 from ars_web.sessions.store import SessionStore
 from ars_web.sessions.transaction import SessionTransaction
 
-__all__ = ["BoxDraft", "NothingToUndo", "SessionEditor"]
+__all__ = ["UNSET", "BoxDraft", "NothingToUndo", "SessionEditor"]
 
 
 class NothingToUndo(BadInput):
@@ -45,6 +54,10 @@ class SessionEditor:
 
     Every method raises NotFound for an unknown session and StoreError where the edit cannot be kept. Methods with
     `expected_revision` raise Conflict where the thing is no longer at that revision; `current` is what it is now.
+
+    A locked box keeps its class, place and size, and is not deleted: Locked says so. It may be renamed and unlocked,
+    also together with other changes, which then count. Undo and redo bring back what was, locks included; a box that
+    someone else locked since is a Conflict for them, as after any other change.
     """
 
     def __init__(self, store: SessionStore) -> None:
@@ -60,19 +73,48 @@ class SessionEditor:
         return self._listeners.add(callback)
 
     def add_box(
-        self, sid: str, *, class_id: int, box: Box, name: str | None = None, author: str, key: str | None = None
+        self,
+        sid: str,
+        *,
+        class_id: int,
+        box: Box,
+        name: str | None = None,
+        locked: bool = False,
+        author: str,
+        key: str | None = None,
     ) -> VirtualBox:
         """A new box, called after its class unless `name` says otherwise.
 
         A repeat with the same idempotency `key` returns what the first returned, and adds nothing.
         """
         with self._editing(sid) as session:
-            digest = request_digest("add box", author, class_id, box.T_world_box, box.size, name)
+            # Nothing more where it is not locked: keys from before there were locks stay good.
+            more = ("locked",) if locked else ()
+            digest = request_digest("add box", author, class_id, box.T_world_box, box.size, name, *more)
             before = None if key is None else session.answered(checked_key(key), digest=digest)
             if before is not None:
                 return _first_box(before)
-            boxes = drafted(session.state, [BoxDraft(class_id, box, name)])
-            edit = self._append(session, _additions(boxes), author=author, summary=f"Add {boxes[0].name}")
+            added = drafted_box(session.state, BoxDraft(class_id, box, name, locked))
+            edit = self._append(session, _additions([added]), author=author, summary=f"Add {added.name}")
+            if key is not None:
+                session.remember(key, digest=digest)
+        return _first_box(edit)
+
+    def duplicate_box(self, sid: str, box_id: int, *, author: str, key: str | None = None) -> VirtualBox:
+        """A new box like another, beside it along its own x (see `geometry.box.beside`), called `cube 2` after `cube`.
+
+        It is not locked, also where the other one is. A repeat with the same idempotency `key` returns what the first
+        returned, and adds nothing.
+        """
+        with self._editing(sid) as session:
+            digest = request_digest("duplicate box", author, box_id)
+            before = None if key is None else session.answered(checked_key(key), digest=digest)
+            if before is not None:
+                return _first_box(before)
+            original = existing_box(session.state, box_id)
+            name = FreshNames(box.name for box in session.state.boxes.values()).give_copy(original.name)
+            added = drafted_box(session.state, BoxDraft(original.class_id, beside(original.box), name))
+            edit = self._append(session, _additions([added]), author=author, summary=f"Duplicate {original.name}")
             if key is not None:
                 session.remember(key, digest=digest)
         return _first_box(edit)
@@ -80,9 +122,13 @@ class SessionEditor:
     def add_boxes(
         self, sid: str, drafts: Sequence[BoxDraft], *, author: str, summary: str = "Import boxes"
     ) -> list[VirtualBox]:
-        """Several boxes in one edit, which one undo takes back; none at all if one of them cannot be added."""
+        """Several boxes in one edit, which one undo takes back; none at all if one of them cannot be added.
+
+        Raises:
+            BadInput: it begins with the number of the box, from 0.
+        """
         with self._editing(sid) as session:
-            boxes = drafted(session.state, drafts)
+            boxes = drafted_boxes(session.state, drafts)
             if boxes:
                 self._append(session, _additions(boxes), author=author, summary=summary)
         return boxes
@@ -97,12 +143,15 @@ class SessionEditor:
         T_world_box: Transform | None = None,
         size: np.ndarray | None = None,
         name: str | None = None,
+        locked: bool | None = None,
         author: str,
     ) -> VirtualBox:
         """Change what is given of a box and leave the rest. Nothing new given: the box as it is."""
         with self._editing(sid) as session:
             before = box_at(session.state, box_id, expected_revision)
-            after = changed_box(session.state, before, class_id=class_id, T_world_box=T_world_box, size=size, name=name)
+            after = changed_box(
+                session.state, before, class_id=class_id, T_world_box=T_world_box, size=size, name=name, locked=locked
+            )
             if after is before:
                 return before
             self._append(
@@ -110,21 +159,54 @@ class SessionEditor:
             )
         return after
 
+    def rest_on_ground(
+        self, sid: str, box_id: int, *, expected_revision: int, author: str, key: str | None = None
+    ) -> VirtualBox:
+        """Move a box up or down until its lowest corner is at z = 0. It rests there already: the box as it is.
+
+        A repeat with the same idempotency `key` returns what the first returned, and moves nothing.
+        """
+        with self._editing(sid) as session:
+            digest = request_digest("rest on ground", author, box_id, expected_revision)
+            answered = None if key is None else session.answered(checked_key(key), digest=digest)
+            if answered is not None:
+                return _first_box(answered)
+            before = box_at(session.state, box_id, expected_revision)
+            T = resting_on_ground(before.box).T_world_box
+            after = changed_box(session.state, before, class_id=None, T_world_box=T, size=None, name=None, locked=None)
+            if after is before:
+                return before
+            summary = f"Put {before.name} on the ground"
+            self._append(session, (BoxChange(box_id, before, after),), author=author, summary=summary)
+            if key is not None:
+                session.remember(key, digest=digest)
+        return after
+
     def delete_box(self, sid: str, box_id: int, *, expected_revision: int, author: str) -> None:
         """Take a box away; undo brings it back with the same id."""
         with self._editing(sid) as session:
             before = box_at(session.state, box_id, expected_revision)
+            refuse_locked(before, "existence")
             self._append(session, (BoxChange(box_id, before, None),), author=author, summary=f"Delete {before.name}")
 
     def add_class(
-        self, sid: str, *, name: str, color: str | None = None, author: str, key: str | None = None
+        self,
+        sid: str,
+        *,
+        name: str,
+        color: str | None = None,
+        default_size: ClassSize | None = None,
+        author: str,
+        key: str | None = None,
     ) -> ObjectClass:
         """A new class, in the next colour of the palette unless `color` says otherwise.
 
         A repeat with the same idempotency `key` returns what the first returned, and adds nothing.
         """
         with self._editing(sid) as session:
-            digest = request_digest("add class", author, name, color)
+            # Nothing more where there is no size: keys from before there were sizes stay good.
+            more = () if default_size is None else (default_size,)
+            digest = request_digest("add class", author, name, color, *more)
             before = None if key is None else session.answered(checked_key(key), digest=digest)
             if before is not None:
                 return _first_class(before)
@@ -134,6 +216,7 @@ class SessionEditor:
                 name=free_class_name(state, name),
                 color=next_color(c.color for c in state.classes.values()) if color is None else checked_color(color),
                 revision=state.revision + 1,
+                default_size=class_size(default_size),
             )
             change = ClassChange(added.id, None, added)
             self._append(session, (change,), author=author, summary=f"Add class {added.name}")
@@ -149,21 +232,20 @@ class SessionEditor:
         expected_revision: int,
         name: str | None = None,
         color: str | None = None,
+        default_size: ClassSize | Literal[Unset.UNSET] | None = UNSET,
         author: str,
     ) -> ObjectClass:
-        """Change a class's name or colour. Nothing new given: the class as it is."""
+        """Change what is given of a class and leave the rest; `default_size` None: it has none any more.
+
+        Nothing new given: the class as it is.
+        """
         with self._editing(sid) as session:
             before = class_at(session.state, class_id, expected_revision)
-            after = replace(
-                before,
-                name=before.name if name is None else free_class_name(session.state, name, own_id=class_id),
-                color=before.color if color is None else checked_color(color),
-            )
-            if after == before:
+            after = changed_class(session.state, before, name=name, color=color, default_size=default_size)
+            if after is before:
                 return before
-            after = replace(after, revision=session.state.revision + 1)
             change = ClassChange(class_id, before, after)
-            self._append(session, (change,), author=author, summary=f"Change class {before.name}")
+            self._append(session, (change,), author=author, summary=class_change_summary(before, after))
         return after
 
     def delete_class(self, sid: str, class_id: int, *, expected_revision: int, author: str) -> None:

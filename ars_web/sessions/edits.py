@@ -75,10 +75,10 @@ T = TypeVar("T", VirtualBox, ObjectClass)
 def same_content(a: Thing | None, b: Thing | None) -> bool:
     """Whether two boxes, or two classes, are alike in everything but the revision that made them so."""
     if isinstance(a, ObjectClass) and isinstance(b, ObjectClass):
-        return (a.id, a.name, a.color) == (b.id, b.name, b.color)
+        return (a.id, a.name, a.color, a.default_size) == (b.id, b.name, b.color, b.default_size)
     if isinstance(a, VirtualBox) and isinstance(b, VirtualBox):
         return (
-            (a.id, a.class_id, a.name, a.has_hull) == (b.id, b.class_id, b.name, b.has_hull)
+            (a.id, a.class_id, a.name, a.has_hull, a.locked) == (b.id, b.class_id, b.name, b.has_hull, b.locked)
             and np.array_equal(a.box.T_world_box, b.box.T_world_box)
             and np.array_equal(a.box.size, b.box.size)
         )

@@ -1,5 +1,6 @@
 """What names of sessions, classes, boxes, authors and images may be."""
 
+import re
 import unicodedata
 from collections.abc import Iterable
 from pathlib import PurePosixPath
@@ -50,6 +51,17 @@ class FreshNames:
     def take(self, name: str) -> None:
         """Have `name` be taken from now on."""
         self._taken.add(name)
+
+    def give_copy(self, name: str) -> str:
+        """A name for a copy of what is called `name`: `cube 2` of `cube`, `cube 3` of `cube 2`; taken from now on."""
+        numbered = re.fullmatch(r"(.*\S) ([1-9][0-9]{0,8})", name)
+        base, number = (numbered[1], int(numbered[2])) if numbered else (name, 1)
+        while True:
+            number += 1
+            copy = f"{base[: LONGEST_NAME - len(f' {number}')]} {number}"
+            if copy not in self._taken:
+                self._taken.add(copy)
+                return copy
 
     def give(self, base: str) -> str:
         """`base`, or `base 2`, `base 3`, … where it is taken, never longer than LONGEST_NAME; taken from now on."""

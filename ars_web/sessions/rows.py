@@ -20,6 +20,7 @@ from ars_web.sessions import tables
 from ars_web.sessions.edit_json import (
     changes_from_json,
     changes_json,
+    default_size_from_json,
     state_from_json,
     state_json,
     utc_from_text,
@@ -82,7 +83,7 @@ def load_state(connection: Connection) -> SessionState:
     return SessionState(
         revision=row.revision,
         name=row.name,
-        classes={c.id: ObjectClass(c.id, c.name, c.color, c.revision) for c in classes},
+        classes={c.id: _class(c) for c in classes},
         boxes={b.id: _box(b) for b in boxes},
         next_class_id=row.next_class_id,
         next_box_id=row.next_box_id,
@@ -287,9 +288,14 @@ def _edit(row: Row[Any]) -> Edit:
     )
 
 
+def _class(row: Row[Any]) -> ObjectClass:
+    size = None if row.default_size is None else default_size_from_json(row.default_size)
+    return ObjectClass(row.id, row.name, row.color, row.revision, size)
+
+
 def _box(row: Row[Any]) -> VirtualBox:
     box = Box(_transforms(row.pose, count=1)[0], np.array([row.size_x, row.size_y, row.size_z]))
-    return VirtualBox(row.id, row.class_id, row.name, box, row.has_hull, row.revision)
+    return VirtualBox(row.id, row.class_id, row.name, box, row.has_hull, row.revision, row.locked)
 
 
 def _box_row(box: VirtualBox) -> dict[str, Any]:
@@ -304,11 +310,19 @@ def _box_row(box: VirtualBox) -> dict[str, Any]:
         "size_z": z,
         "has_hull": box.has_hull,
         "revision": box.revision,
+        "locked": box.locked,
     }
 
 
 def _class_row(a_class: ObjectClass) -> dict[str, Any]:
-    return {"id": a_class.id, "name": a_class.name, "color": a_class.color, "revision": a_class.revision}
+    size = a_class.default_size
+    return {
+        "id": a_class.id,
+        "name": a_class.name,
+        "color": a_class.color,
+        "revision": a_class.revision,
+        "default_size": None if size is None else orjson.dumps(size).decode(),
+    }
 
 
 def _camera_row(camera_id: int, camera: Camera) -> dict[str, Any]:

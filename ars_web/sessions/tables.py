@@ -16,6 +16,7 @@ from sqlalchemy import (
     Table,
     Text,
     false,
+    text,
 )
 
 metadata = MetaData()
@@ -78,6 +79,8 @@ object_class = Table(
     Column("name", Text, nullable=False, unique=True),
     Column("color", Text, nullable=False),
     Column("revision", Integer, nullable=False),
+    # Three lengths as a JSON list; NULL: nobody has said.
+    Column("default_size", Text),
 )
 
 box = Table(
@@ -93,6 +96,7 @@ box = Table(
     Column("size_z", Float, nullable=False),
     Column("has_hull", Boolean, nullable=False, server_default=false()),
     Column("revision", Integer, nullable=False),
+    Column("locked", Boolean, nullable=False, server_default=false()),
 )
 
 edit = Table(
@@ -106,6 +110,9 @@ edit = Table(
     Column("redoes", Integer, ForeignKey("edit.revision")),
     Column("at", Text, nullable=False),
     Index("edit_by_author", "author", "revision"),
+    # What takes a given edit back is looked up without reading the log.
+    Index("edit_by_undone", "undoes", sqlite_where=text("undoes IS NOT NULL")),
+    Index("edit_by_redone", "redoes", sqlite_where=text("redoes IS NOT NULL")),
 )
 
 request = Table(

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from ars_web.errors import BadInput
 from ars_web.geometry import rigid_transform
-from ars_web.geometry.box import EDGES, LARGEST_SIZE, Box, from_four_points, iou, stack
+from ars_web.geometry.box import EDGES, LARGEST_SIZE, Box, beside, from_four_points, iou, resting_on_ground, stack
 
 
 def random_box(random: np.random.Generator, *, spread: float = 0.4) -> Box:
@@ -166,3 +166,28 @@ def test_a_bent_corner_is_shared_among_the_edges():
 def test_points_that_make_no_box_are_refused(points: list[list[float]], message: str):
     with pytest.raises(BadInput, match=message):
         from_four_points(np.array(points, dtype=np.float64))
+
+
+def test_a_box_beside_another_is_like_it_and_touches_nothing():
+    random = np.random.default_rng(5)
+    for _ in range(20):
+        box = random_box(random)
+        other = beside(box, gap=0.02)
+        assert_array_equal(other.size, box.size)
+        assert_array_equal(other.T_world_box[:3, :3], box.T_world_box[:3, :3])
+        there = rigid_transform.transform_points(
+            rigid_transform.invert(box.T_world_box), other.T_world_box[None, :3, 3]
+        )
+        assert_allclose(there[0], [box.size[0] + 0.02, 0, 0], atol=1e-12)
+        assert iou(box, other) == 0
+
+
+def test_a_box_rests_on_its_lowest_corner_and_keeps_its_orientation():
+    random = np.random.default_rng(6)
+    for _ in range(20):
+        box = random_box(random, spread=3.0)
+        resting = resting_on_ground(box)
+        assert resting.corners_world[:, 2].min() == pytest.approx(0, abs=1e-12)
+        assert_array_equal(resting.T_world_box[:3, :3], box.T_world_box[:3, :3])
+        assert_array_equal(resting.T_world_box[:2, 3], box.T_world_box[:2, 3])
+        assert_allclose(resting_on_ground(resting).T_world_box, resting.T_world_box, atol=1e-12)

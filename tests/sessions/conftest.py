@@ -1,6 +1,9 @@
 """Small recordings made by hand, and a store of their sessions."""
 
+import json
+import sqlite3
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +13,7 @@ from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box
 from ars_web.geometry.camera import Camera
 from ars_web.recordings.recording import Frame, Recording
+from ars_web.sessions import migration
 from ars_web.sessions.editing import SessionEditor
 from ars_web.sessions.store import SessionStore
 
@@ -66,3 +70,38 @@ def a_box() -> Callable[..., Box]:
         return Box(rigid_transform.from_rotation(R, np.array([x, 0.2, 0.3])), np.array([size, 0.2, 0.3]))
 
     return make
+
+
+@pytest.fixture
+def made_by_older_program() -> Callable[[Path, str], None]:
+    """Makes a session's database, which nobody has open, anew as the program with an older schema would have."""
+    return _make_older
+
+
+def _make_older(path: Path, schema: str) -> None:
+    older = path.with_name("older.sqlite")
+    migration.bring_up_to_date(older, target=schema)
+    with closing(sqlite3.connect(older)) as connection:
+        connection.execute("ATTACH ? AS newer", (str(path),))
+        for (table,) in connection.execute("SELECT name FROM main.sqlite_master WHERE type = 'table'").fetchall():
+            if table != "alembic_version":
+                names = [row[1] for row in connection.execute(f"PRAGMA main.table_info({table})")]
+                assert not {"locked", "default_size"} & set(names)
+                columns = ", ".join(names)
+                connection.execute(f"INSERT INTO main.{table} ({columns}) SELECT {columns} FROM newer.{table}")
+        _forget_what_is_new(connection, "SELECT origin, id FROM session", "UPDATE session SET origin = ? WHERE id = ?")
+        log = "SELECT changes, revision FROM edit"
+        _forget_what_is_new(connection, log, "UPDATE edit SET changes = ? WHERE revision = ?")
+        connection.commit()
+    path.unlink()
+    older.rename(path)
+
+
+def _forget_what_is_new(connection: sqlite3.Connection, select: str, update: str) -> None:
+    """Have JSON in the database be as programs without locks and sizes wrote it."""
+
+    def older(item: dict[str, object]) -> dict[str, object]:
+        return {key: value for key, value in item.items() if key not in ("locked", "default_size")}
+
+    for text, key in connection.execute(select).fetchall():
+        connection.execute(update, (json.dumps(json.loads(text, object_hook=older)), key))

@@ -23,12 +23,13 @@ GOOD = {"class_id": 0, "T_world_box": {"position": [0, 0.5, 1], "wxyz": [2, 0, 0
 def test_a_box_is_written_as_the_contract_says():
     T = rigid_transform.from_position_wxyz(np.array([1.0, 2.0, 3.0]), np.array([-0.5, 0.5, 0.5, 0.5]))
     written = box_json(VirtualBox(7, 1, "left", Box(T, np.array([0.1, 0.2, 0.3])), False, 12))
-    assert list(written) == ["id", "class_id", "name", "T_world_box", "size", "has_hull", "revision"]
+    assert list(written) == ["id", "class_id", "name", "T_world_box", "size", "has_hull", "locked", "revision"]
+    assert written["locked"] is False
     assert written["T_world_box"]["position"] == [1.0, 2.0, 3.0]
     assert written["T_world_box"]["wxyz"] == pytest.approx([0.5, -0.5, -0.5, -0.5])
     assert (written["size"], written["has_hull"], written["revision"]) == ([0.1, 0.2, 0.3], False, 12)
     assert class_json(ObjectClass(0, "cube", "#56b4e9", 3)) == {
-        "id": 0, "name": "cube", "color": "#56b4e9", "revision": 3,
+        "id": 0, "name": "cube", "color": "#56b4e9", "default_size": None, "revision": 3,
     }  # fmt: skip
 
 

@@ -230,15 +230,15 @@ def test_a_backup_brought_back_under_a_running_store_is_what_is_read(
 
 
 def test_one_session_that_is_slow_to_open_holds_up_no_other(
-    store: SessionStore, make_recording: MakeRecording, sid: str
+    store: SessionStore,
+    make_recording: MakeRecording,
+    sid: str,
+    made_by_older_program: Callable[[Path, str], None],
 ):
     other = store.create(make_recording(), name="other").id
     store.close()
     path = store.folder / sid / "session.sqlite"
-    with closing(sqlite3.connect(path)) as connection:  # so that opening it migrates, for which it waits below
-        connection.execute("DROP TABLE request")
-        connection.execute("UPDATE alembic_version SET version_num = '0001'")
-        connection.commit()
+    made_by_older_program(path, "0001")  # so that opening it migrates, for which it waits below
     found: list[int] = []
     with closing(sqlite3.connect(path, isolation_level=None)) as holder:
         holder.execute("BEGIN IMMEDIATE")

@@ -23,9 +23,10 @@ def contents(state: SessionState) -> dict[str, object]:
     """The state without revisions: what a user sees."""
     return {
         "name": state.name,
-        "classes": [(c.id, c.name, c.color) for c in state.classes.values()],
+        "classes": [(c.id, c.name, c.color, c.default_size) for c in state.classes.values()],
         "boxes": [
-            (b.id, b.class_id, b.name, b.box.T_world_box.tolist(), b.box.size.tolist()) for b in state.boxes.values()
+            (b.id, b.class_id, b.name, b.locked, b.box.T_world_box.tolist(), b.box.size.tolist())
+            for b in state.boxes.values()
         ],
     }
 
@@ -368,7 +369,24 @@ def test_a_listener_may_edit(store: SessionStore, editor: SessionEditor, sid: st
 
 steps = st.lists(
     st.tuples(
-        st.sampled_from(["add", "add", "move", "name", "delete", "class", "unclass", "color", "undo", "undo", "redo"]),
+        st.sampled_from(
+            [
+                "add",
+                "add",
+                "move",
+                "name",
+                "delete",
+                "class",
+                "unclass",
+                "color",
+                "size",
+                "lock",
+                "duplicate",
+                "undo",
+                "undo",
+                "redo",
+            ]
+        ),
         st.sampled_from(["ann", "bob"]),
         st.integers(0, 7),
     ),
@@ -420,16 +438,23 @@ def act(editor: SessionEditor, sid: str, state: SessionState, action: str, autho
         editor.undo(sid, author=author)
     elif action == "redo":
         editor.redo(sid, author=author)
-    elif action in ("unclass", "color") and classes:
+    elif action in ("unclass", "color", "size") and classes:
         a_class = classes[n % len(classes)]
         if action == "color":
             editor.change_class(sid, a_class.id, expected_revision=a_class.revision, color=f"#00000{n}", author=author)
+        elif action == "size":
+            size = (0.1 * n, 0.2, 0.3) if n else None
+            editor.change_class(sid, a_class.id, expected_revision=a_class.revision, default_size=size, author=author)
         else:
             editor.delete_class(sid, a_class.id, expected_revision=a_class.revision, author=author)
     elif boxes:
         box = boxes[n % len(boxes)]
         if action == "delete":
             editor.delete_box(sid, box.id, expected_revision=box.revision, author=author)
+        elif action == "duplicate":
+            editor.duplicate_box(sid, box.id, author=author)
+        elif action == "lock":
+            editor.change_box(sid, box.id, expected_revision=box.revision, locked=not box.locked, author=author)
         elif action == "move":
             editor.change_box(sid, box.id, expected_revision=box.revision, T_world_box=T, author=author)
         else:

@@ -27,6 +27,15 @@ def test_a_taken_name_gets_the_next_number_and_stays_short_enough():
     assert FreshNames([long]).give(long) == "a" * (LONGEST_NAME - 2) + " 2"
 
 
+def test_a_copy_has_the_next_free_number():
+    names = FreshNames(["cube", "cube 2", "ring 7", "3 balls", "nr 0", "x 1"])
+    assert [names.give_copy(name) for name in ("cube", "cube", "cube 2", "ring 7", "3 balls", "nr 0", "x 1", "2")] == [
+        "cube 3", "cube 4", "cube 5", "ring 8", "3 balls 2", "nr 0 2", "x 2", "2 2",
+    ]  # fmt: skip
+    long = "a" * LONGEST_NAME
+    assert FreshNames([long]).give_copy(long) == "a" * (LONGEST_NAME - 2) + " 2"
+
+
 def test_very_many_names_are_given_as_fast_as_few():
     names = FreshNames([])
     assert len({names.give("cube") for _ in range(100_000)}) == 100_000

@@ -336,13 +336,16 @@ def test_archives_are_unpacked_within_limits(elsewhere: SessionStore, carried: P
     assert not (tmp_path / "escaped").exists()
 
 
+@pytest.mark.parametrize("schema", ["0001", "0002"])
 def test_an_older_programs_session_is_migrated_on_its_way_in(
-    store: SessionStore, elsewhere: SessionStore, carried: Path, sid: str
+    store: SessionStore,
+    elsewhere: SessionStore,
+    carried: Path,
+    sid: str,
+    schema: str,
+    made_by_older_program: Callable[[Path, str], None],
 ):
-    with closing(sqlite3.connect(carried / "session.sqlite")) as connection:
-        connection.execute("DROP TABLE request")
-        connection.execute("UPDATE alembic_version SET version_num = '0001'")
-        connection.commit()
+    made_by_older_program(carried / "session.sqlite", schema)
     imported = import_session(elsewhere, carried)
     assert differences(elsewhere.state(imported.id), store.state(sid)) == []
     with closing(sqlite3.connect(elsewhere.folder / imported.id / "session.sqlite")) as connection:
