@@ -6,11 +6,12 @@ import ipaddress
 import logging
 import socket
 import sys
-from collections.abc import AsyncGenerator, Callable
+from collections.abc import AsyncGenerator, Callable, Mapping
 from concurrent.futures import Executor
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import uvicorn
 from fastapi import FastAPI
@@ -18,20 +19,34 @@ from starlette.concurrency import run_in_threadpool
 from starlette.staticfiles import StaticFiles
 
 from ars_web import __version__
-from ars_web.api import boxes, classes, exports, frames, health, history, login, openapi, problems, sessions
+from ars_web.api import boxes, classes, exports, frames, health, history, live, login, openapi, problems, sessions
 from ars_web.api.body_limit import BodyLimit
 from ars_web.api.credentials import CODE_LIFETIME, Cookies, LoginCodes, install_token
 from ars_web.api.dependencies import Services
 from ars_web.api.events import EventHub
+from ars_web.api.live_line import GOODBYE_SECONDS, LiveLines
+from ars_web.api.presence import Presence
 from ars_web.api.security import Door, Guard
 from ars_web.datasets.exports import ExportJobs
 from ars_web.errors import BadInput, StoreError
 from ars_web.sessions.editing import SessionEditor
 from ars_web.sessions.store import SessionStore
 from ars_web.settings import Settings
+from ars_web.workspace import BoxPreview, ViewAction, ViewEvent, ViewState
 
 SHUTDOWN_SECONDS = 5
 """How long a server that is stopped waits for answers that are being sent."""
+
+WEBSOCKETS: Mapping[str, Any] = {
+    "ws": "websockets-sansio",
+    "ws_max_size": 2**20,
+    # A page that vanished, with its laptop's lid or its network, is noticed after twice that.
+    "ws_ping_interval": 20.0,
+    "ws_ping_timeout": 20.0,
+    # Costs each line 60 KB and time, and what goes over it is small.
+    "ws_per_message_deflate": False,
+}
+"""How uvicorn speaks websocket."""
 
 
 def create_app(settings: Settings) -> FastAPI:
@@ -47,7 +62,7 @@ def create_app(settings: Settings) -> FastAPI:
     )
     static = static_folder()
     problems.install(app)
-    for module in (health, sessions, classes, frames, boxes, history, exports):
+    for module in (health, sessions, classes, frames, boxes, history, live, exports):
         app.include_router(module.router)
     app.include_router(login.router(static))
     openapi.install(app)
@@ -78,6 +93,9 @@ def _lifespan(settings: Settings) -> Callable[[FastAPI], AbstractAsyncContextMan
                         editor=editor,
                         exports=jobs,
                         events=hub,
+                        lines=LiveLines(),
+                        presence=Presence(),
+                        scene=_Unseen(),
                         door=Door(
                             token=token,
                             cookies=Cookies(token),
@@ -161,6 +179,7 @@ def serve(settings: Settings, *, on_ready: Callable[[str], None] | None = None) 
             proxy_headers=False,
             server_header=False,
             timeout_graceful_shutdown=SHUTDOWN_SECONDS,
+            **WEBSOCKETS,
         )
 
         def ready() -> None:
@@ -182,8 +201,22 @@ def serve(settings: Settings, *, on_ready: Callable[[str], None] | None = None) 
                 app.state.services.exports.close()
 
 
+class _Unseen:
+    """The scene as long as there is none to join here."""
+
+    def attach(self, sid: str, view: str, *, author: str, send: Callable[[ViewEvent], None]) -> None: ...
+
+    def detach(self, sid: str, view: str) -> None: ...
+
+    def show(self, sid: str, view: str, state: ViewState) -> None: ...
+
+    def act(self, sid: str, view: str, action: ViewAction) -> None: ...
+
+    def preview(self, sid: str, view: str, preview: BoxPreview | None) -> None: ...
+
+
 class _Server(uvicorn.Server):
-    """Says when it is ready, and ends event streams before it waits for connections to close."""
+    """Says when it is ready, and ends event streams and live lines before it waits for connections to close."""
 
     def __init__(self, config: uvicorn.Config, app: FastAPI, ready: Callable[[], None]) -> None:
         super().__init__(config)
@@ -196,7 +229,10 @@ class _Server(uvicorn.Server):
             self._ready()
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        self._app.state.services.events.close()
+        services: Services = self._app.state.services
+        services.events.close()
+        # uvicorn would close them with another code, and a page learn less of why.
+        await services.lines.all_closed(seconds=GOODBYE_SECONDS)
         await super().shutdown(sockets)
 
 

@@ -7,16 +7,20 @@ from typing import Annotated, Any
 
 import orjson
 from fastapi import Depends, Header, Request, Response
+from fastapi.requests import HTTPConnection
 from fastapi.routing import APIRoute
 
 from ars_web.api.credentials import LoginCodes
 from ars_web.api.events import EventHub
+from ars_web.api.live_line import LiveLines
+from ars_web.api.presence import Presence
 from ars_web.api.problems import PreconditionMissing
 from ars_web.api.security import Door
 from ars_web.datasets.exports import ExportJobs
 from ars_web.errors import BadInput
 from ars_web.sessions.editing import SessionEditor
 from ars_web.sessions.store import SessionStore
+from ars_web.workspace import SceneViews
 
 
 @dataclass(frozen=True)
@@ -24,6 +28,9 @@ class Services:
     """What one server works with, opened and closed by `app.py`.
 
     Attributes:
+        lines: the live lines that are open.
+        presence: who is at which session.
+        scene: what the live lines show their pages.
         door: who is let in.
         codes: one-time login codes.
         roots: folders that clients may import recordings from, links resolved, by name.
@@ -34,20 +41,23 @@ class Services:
     editor: SessionEditor
     exports: ExportJobs
     events: EventHub
+    lines: LiveLines
+    presence: Presence
+    scene: SceneViews
     door: Door
     codes: LoginCodes
     roots: Mapping[str, Path]
     largest_upload: int
 
 
-def _services(request: Request) -> Services:
-    services = request.app.state.services
+def _services(connection: HTTPConnection) -> Services:
+    services = connection.app.state.services
     assert isinstance(services, Services)
     return services
 
 
-def _author(request: Request) -> str:
-    author: object = request.scope["state"]["author"]
+def _author(connection: HTTPConnection) -> str:
+    author: object = connection.scope["state"]["author"]
     assert isinstance(author, str), "the guard lets nobody else in"
     return author
 

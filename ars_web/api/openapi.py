@@ -1,14 +1,17 @@
-"""The OpenAPI document: what FastAPI derives from the routes, with the problems and the ways to log in added."""
+"""The OpenAPI document: what FastAPI derives from the routes; the problems, the live line's messages and the ways to
+log in are added."""
 
 from typing import Any, cast
 
 from fastapi import FastAPI, Response
 from fastapi.openapi.utils import get_openapi
+from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
 from ars_web.api.dependencies import JsonResponse
+from ars_web.api.live_models import LiveFromPage, LiveToPage
 from ars_web.api.models import EditJson
-from ars_web.api.problems import DESCRIPTIONS, Problem
+from ars_web.api.problems import DESCRIPTIONS
 from ars_web.api.security import OPEN_PATHS
 
 _DESCRIPTION = (
@@ -32,9 +35,10 @@ def document(app: FastAPI) -> dict[str, Any]:
     if app.openapi_schema is None:
         schema = get_openapi(title=app.title, version=app.version, description=_DESCRIPTION, routes=app.routes)
         components = cast(dict[str, Any], schema.setdefault("components", {}))
-        models: list[type[Problem] | type[EditJson]] = [*{model for model, _ in DESCRIPTIONS.values()}, EditJson]
+        answers: list[type[BaseModel]] = [*{model for model, _ in DESCRIPTIONS.values()}, EditJson, LiveToPage]
         _, found = models_json_schema(
-            [(model, "serialization") for model in models], ref_template="#/components/schemas/{model}"
+            [(LiveFromPage, "validation"), *((model, "serialization") for model in answers)],
+            ref_template="#/components/schemas/{model}",
         )
         components["schemas"] = {**components.get("schemas", {}), **found["$defs"]}
         # FastAPI's own words for a refused request; ours is ValidationProblem.

@@ -2,10 +2,11 @@
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import cv2
@@ -16,7 +17,7 @@ import uvicorn
 from fastapi import FastAPI
 
 from ars_web.api.dependencies import Services
-from ars_web.app import create_app, listening
+from ars_web.app import WEBSOCKETS, create_app, listening
 from ars_web.settings import Settings
 
 TOKEN = "a-token-for-tests"
@@ -78,7 +79,9 @@ def until(condition: Callable[[], bool], *, seconds: float = 20.0) -> None:
         pause.wait(0.01)
 
 
-def run_server(folder: Path, **settings: Any) -> Iterator[Server]:
+def run_server(
+    folder: Path, *, websockets: Mapping[str, Any] = MappingProxyType({}), **settings: Any
+) -> Iterator[Server]:
     root = folder / "root"
     if not root.exists():
         write_scene(root / "scene")
@@ -97,7 +100,7 @@ def run_server(folder: Path, **settings: Any) -> Iterator[Server]:
             }
         )
     )
-    server = uvicorn.Server(uvicorn.Config(app, log_level="warning", access_log=False, ws="none"))
+    server = uvicorn.Server(uvicorn.Config(app, log_level="warning", access_log=False, **{**WEBSOCKETS, **websockets}))
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
     thread.start()
     try:
