@@ -18,7 +18,20 @@ settings.load_profile("untimed")
 # Every annotated shape in geometry/ is checked while the tests run. Kernel modules hold numba code, which takes
 # no such wrapper.
 install_import_hook(
-    [f"ars_web.geometry.{name}" for name in ("rigid_transform", "camera", "box", "labels", "occlusion")],
+    [
+        f"ars_web.geometry.{name}"
+        for name in (
+            "rigid_transform",
+            "camera",
+            "projection_jacobian",
+            "box",
+            "labels",
+            "occlusion",
+            "triangulation",
+            "epipolar",
+            "box_sensitivity",
+        )
+    ],
     "beartype.beartype",
 )
 

@@ -187,7 +187,7 @@ def normalised_from_pixels(camera: Camera, pixels: Float[np.ndarray, "*n 2"]) ->
     lost = np.isnan(out).any(axis=-1) & np.isfinite(r_d)
     out = np.where(lost[..., None], distorted * (0.999 * camera.valid_radius / np.maximum(r_d, 1e-12))[..., None], out)
     for _ in range(20):
-        residual, jacobian = _brown_with_jacobian(camera, out)
+        residual, jacobian = distorted_with_jacobian(camera, out)
         residual -= distorted
         det = jacobian[..., 0, 0] * jacobian[..., 1, 1] - jacobian[..., 0, 1] * jacobian[..., 1, 0]
         det = np.where(np.abs(det) < 1e-12, 1e-12, det)
@@ -223,26 +223,40 @@ def _undistorted_radius(camera: Camera, r_d: Float[np.ndarray, "*n"]) -> Float[n
     return np.tan(r) if camera.model == "fisheye" else r
 
 
-def _brown_with_jacobian(
+def distorted_with_jacobian(
     camera: Camera, normalised: Float[np.ndarray, "*n 2"]
 ) -> tuple[Float[np.ndarray, "*n 2"], Float[np.ndarray, "*n 2 2"]]:
-    k1, k2, p1, p2, k3 = camera.distortion
+    """Where the lens's equations move points (..., 2) of the normalised plane, and the derivative (..., 2, 2) of that,
+    which is symmetric. The valid radius is not asked about: beyond it they are moved to where none belongs."""
     x, y = normalised[..., 0], normalised[..., 1]
     r2 = x * x + y * y
-    radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    slope = 2 * (k1 + r2 * (2 * k2 + r2 * 3 * k3))  # d radial / d r2, times 2
-    value = np.stack(
-        [x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y],
-        axis=-1,
-    )
-    cross = x * y * slope + 2 * p1 * x + 2 * p2 * y
-    jacobian = np.stack(
-        [
-            np.stack([radial + x * x * slope + 2 * p1 * y + 6 * p2 * x, cross], axis=-1),
-            np.stack([cross, radial + y * y * slope + 6 * p1 * y + 2 * p2 * x], axis=-1),
-        ],
-        axis=-2,
-    )
+    if camera.model == "pinhole":
+        value = np.array(normalised, dtype=np.float64)
+        along_x, along_y, cross = np.ones_like(x), np.ones_like(x), np.zeros_like(x)
+    elif camera.model == "brown":
+        k1, k2, p1, p2, k3 = camera.distortion
+        radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        slope = 2 * (k1 + r2 * (2 * k2 + r2 * 3 * k3))  # d radial / d r2, times 2
+        value = np.stack(
+            [x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y],
+            axis=-1,
+        )
+        along_x = radial + x * x * slope + 2 * p1 * y + 6 * p2 * x
+        along_y = radial + y * y * slope + 6 * p1 * y + 2 * p2 * x
+        cross = x * y * slope + 2 * p1 * x + 2 * p2 * y
+    else:
+        k1, k2, k3, k4 = camera.distortion
+        r = np.sqrt(r2)
+        theta = np.arctan(r)
+        t2 = theta * theta
+        far = r > 1e-12
+        across = np.where(far, _fisheye_angle(camera, theta) / np.where(far, r, 1.0), 1.0)
+        outwards = (1 + t2 * (3 * k1 + t2 * (5 * k2 + t2 * (7 * k3 + t2 * 9 * k4)))) / (1 + r2)
+        # Stretched by `outwards` along the radius and by `across` at right angles to it.
+        more = np.where(far, (outwards - across) / np.where(far, r2, 1.0), 0.0)
+        value = normalised * across[..., None]
+        along_x, along_y, cross = across + more * x * x, across + more * y * y, more * x * y
+    jacobian = np.stack([np.stack([along_x, cross], axis=-1), np.stack([cross, along_y], axis=-1)], axis=-2)
     return value, jacobian
 
 
