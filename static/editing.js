@@ -5,6 +5,7 @@
  */
 
 import * as api from "./api.js";
+import { effect } from "./lib/view.js";
 import { rotated, rotatedByDegrees } from "./lib/rotation.js";
 import * as store from "./store.js";
 
@@ -64,7 +65,7 @@ export async function changeBox(id, changes) {
   const seen = existing(id);
   if (moves) showPreview({ box_id: id, T_world_box: changes.T_world_box ?? seen.T_world_box, size: changes.size ?? seen.size });
   try {
-    await inTurn(`box ${id}`, async () => takeBox(await api.changeBox(store.sid.value, id, existing(id).revision, changes)));
+    await inTurn(`box ${id}`, async () => takeBox(await stored(id, changes)));
   } catch (error) {
     if (!(error instanceof api.ApiError) || error.status !== 412 || !moves) throw error;
     const current = /** @type {Box | null} */ (error.current ?? null);
@@ -78,6 +79,46 @@ export async function changeBox(id, changes) {
   } finally {
     if (moves) showPreview(null);
   }
+}
+
+/**
+ * Store a change. Where the server does not answer, wait until it is back: what was typed must not be lost with it.
+ * @param {number} id
+ * @param {Partial<Box>} changes
+ * @returns {Promise<Box>}
+ */
+async function stored(id, changes) {
+  for (let repeated = false; ; repeated = true) {
+    try {
+      return await api.changeBox(store.sid.value, id, existing(id).revision, changes);
+    } catch (error) {
+      if (!(error instanceof api.ApiError)) throw error;
+      // The first attempt may have been stored, and only its answer lost.
+      const current = /** @type {Box | undefined} */ (error.current);
+      if (repeated && error.status === 412 && current && holds(current, changes)) return current;
+      if (error.status !== 0) throw error;
+      await lineIs("open");
+    }
+  }
+}
+
+/** @param {Box} box @param {Partial<Box>} changes */
+function holds(box, changes) {
+  return JSON.stringify({ ...box, ...changes }) === JSON.stringify(box);
+}
+
+/** @param {"open"} state @returns {Promise<void>} */
+function lineIs(state) {
+  // Before the line is known to be lost it still says open: give it time to notice.
+  return new Promise((resolve) => {
+    setTimeout(() => {
+      const stop = effect(() => {
+        if (store.line.value !== state) return;
+        resolve();
+        queueMicrotask(() => stop());
+      });
+    }, 1000);
+  });
 }
 
 /** @param {number} id @param {Place} place */

@@ -47,6 +47,8 @@ export const boxes = signal(/** @type {ReadonlyMap<number, Box>} */ (new Map()))
 export const classes = signal(/** @type {ReadonlyMap<number, ObjectClass>} */ (new Map()));
 /** The newest revision that this page has been told of. */
 export const revision = signal(0);
+/** The newest edit that came over the line, anybody's. */
+export const latestEdit = signal(/** @type {Edit | null} */ (null));
 /** Changes of this page that the server has not confirmed yet. */
 export const unsaved = signal(0);
 /** The line to the server: events come, and edits of others are seen, only while it is open. */
@@ -63,6 +65,8 @@ export const problems = signal(/** @type {ReadonlyMap<string, string>} */ (new M
 // The view.
 export const mode = signal(/** @type {Mode} */ ("scene"));
 export const frame = signal(0);
+/** The frame that the scene shows with its photo; null while it is on its way. */
+export const entered = signal(/** @type {number | null} */ (null));
 export const selected = signal(/** @type {number | null} */ (null));
 export const tool = signal(/** @type {Tool} */ ("select"));
 export const axes = signal(/** @type {"box" | "world"} */ ("box"));

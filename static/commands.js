@@ -1,0 +1,273 @@
+/** Everything frequent, once: what the keys, the palette, the key list and the tool rail all take from. */
+
+import * as store from "./store.js";
+
+/**
+ * @typedef {object} Command
+ * @property {string} id
+ * @property {string} title
+ * @property {"View" | "Frames" | "Tools" | "Box" | "Session"} group
+ * @property {string[]} keys as `chord` writes them; the first is shown
+ * @property {() => void} run
+ * @property {() => boolean} [when] whether it can be done now
+ */
+
+const { actions } = store;
+
+const hasBox = () => store.selectedBox.value !== null;
+const canEdit = () => hasBox() && !store.selectedBox.value?.locked;
+const inPlace = () => store.mode.value !== "export";
+const lastClass = () => [...store.classes.value.keys()].at(-1);
+
+/** Run an action on the selected box; what goes wrong is shown at the box. @param {(id: number) => Promise<void>} action */
+function onBox(action) {
+  const id = store.selected.value;
+  if (id === null) return;
+  action(id).then(
+    () => store.setProblem(`box:${id}`, null),
+    (error) => store.setProblem(`box:${id}`, error.message),
+  );
+}
+
+/** @param {import("./store.js").Mode} mode */
+function goMode(mode) {
+  store.mode.value = mode;
+}
+
+/** @param {import("./store.js").Tool} tool */
+function take(tool) {
+  store.tool.value = tool;
+  if (store.mode.value === "export") goMode("scene");
+}
+
+/** @param {number} step */
+const stepFrame = (step) => actions.goTo(store.frame.value + step);
+
+/**
+ * Arrows move the selected box, or turn it with the rotate tool; without a box they step through the frames.
+ * @param {0 | 1 | 2} axis @param {number} sign @param {number} times
+ */
+function arrow(axis, sign, times) {
+  if (!hasBox()) {
+    if (axis === 0) stepFrame(sign * (times === 1 ? 1 : store.jump.value));
+    return;
+  }
+  /** @param {number} size @returns {[number, number, number]} */
+  const along = (size) => [axis === 0 ? size : 0, axis === 1 ? size : 0, axis === 2 ? size : 0];
+  const box = store.selectedBox.value;
+  if (store.tool.value === "rotate") {
+    actions.nudge([0, 0, 0], along(sign * 0.2 * times));
+  } else if (store.tool.value === "resize" && box !== null) {
+    const step = along(sign * 0.001 * times);
+    actions.editBox(box.id, {
+      T_world_box: box.T_world_box,
+      size: [0, 1, 2].map((i) => Math.max(0.001, box.size[i] + step[i])) /** @type {any} */,
+    });
+  } else {
+    actions.nudge(along(sign * 0.001 * times), [0, 0, 0]);
+  }
+}
+
+/** @returns {Command[]} */
+function arrows() {
+  /** @type {[string, string, 0 | 1 | 2, number][]} */
+  const four = [
+    ["right", "ArrowRight", 0, 1],
+    ["left", "ArrowLeft", 0, -1],
+    ["up", "ArrowUp", 1, 1],
+    ["down", "ArrowDown", 1, -1],
+    ["z-up", "PageUp", 2, 1],
+    ["z-down", "PageDown", 2, -1],
+  ];
+  return four.flatMap(([id, key, axis, sign]) =>
+    [1, 10].map((times) => ({
+      id: `nudge-${id}${times === 10 ? "-10" : ""}`,
+      title: `Nudge the box ${sign > 0 ? "+" : "−"}${"XYZ"[axis]}${times === 10 ? ", 10 times as far" : ""}`,
+      group: /** @type {const} */ ("Box"),
+      keys: [times === 10 ? `Shift+${key}` : key],
+      run: () => arrow(axis, sign, times),
+      when: () => inPlace() && (axis === 0 || hasBox()),
+    })),
+  );
+}
+
+/** @type {Command[]} */
+export const commands = [
+  { id: "mode-scene", title: "Scene", group: "View", keys: ["1"], run: () => goMode("scene") },
+  { id: "mode-frame", title: "Frame", group: "View", keys: ["2"], run: () => actions.enterFrame() },
+  { id: "mode-export", title: "Export", group: "View", keys: ["3"], run: () => goMode("export") },
+  {
+    id: "toggle-frame",
+    title: "Enter or leave the current frame",
+    group: "View",
+    keys: ["F"],
+    run: () => (store.mode.value === "frame" ? actions.leaveFrame() : actions.enterFrame()),
+  },
+  { id: "look-all", title: "Look at everything", group: "View", keys: ["Home"], run: () => actions.look("all"), when: inPlace },
+  { id: "look-selected", title: "Look at the selected box", group: "View", keys: ["L"], run: () => actions.look("selected"), when: hasBox },
+  { id: "look-frame", title: "Look at the current frame's camera", group: "View", keys: ["Shift+L"], run: () => actions.look("frame"), when: inPlace },
+  {
+    id: "contact-sheet",
+    title: "Contact sheet",
+    group: "View",
+    keys: ["C"],
+    run: () => (store.overlay.value = "contact-sheet"),
+  },
+  {
+    id: "blend",
+    title: "Photo on or off",
+    group: "View",
+    keys: ["X"],
+    run: () => (store.blend.value = store.blend.value > 0 ? 0 : 1),
+    when: () => store.mode.value === "frame",
+  },
+  {
+    id: "theme",
+    title: "Dark or light",
+    group: "View",
+    keys: [],
+    run: () => (store.theme.value = store.theme.value === "dark" ? "light" : "dark"),
+  },
+
+  { id: "next", title: "Next frame", group: "Frames", keys: ["."], run: () => stepFrame(1) },
+  { id: "previous", title: "Previous frame", group: "Frames", keys: [","], run: () => stepFrame(-1) },
+  { id: "jump-on", title: "Jump on", group: "Frames", keys: ["Shift+."], run: () => stepFrame(store.jump.value) },
+  { id: "jump-back", title: "Jump back", group: "Frames", keys: ["Shift+,"], run: () => stepFrame(-store.jump.value) },
+  { id: "first", title: "First frame", group: "Frames", keys: ["Ctrl+Home"], run: () => actions.goTo(0) },
+  { id: "last", title: "Last frame", group: "Frames", keys: ["Ctrl+End"], run: () => actions.goTo(store.frames.value - 1) },
+
+  { id: "select", title: "Select", group: "Tools", keys: ["V"], run: () => take("select") },
+  { id: "move", title: "Move", group: "Tools", keys: ["G"], run: () => take("move") },
+  { id: "rotate", title: "Rotate", group: "Tools", keys: ["R"], run: () => take("rotate") },
+  { id: "resize", title: "Resize by its faces", group: "Tools", keys: ["S"], run: () => take("resize") },
+  {
+    id: "new-box",
+    title: "New box where the view looks",
+    group: "Tools",
+    keys: ["B"],
+    run: () => {
+      const known = store.selectedBox.value?.class_id ?? lastClass();
+      if (known === undefined) store.setProblem("boxes", "A box needs a class: add one below first.");
+      else actions.newBox(known);
+    },
+    when: inPlace,
+  },
+  { id: "points", title: "Box from four points", group: "Tools", keys: ["P"], run: () => take("points") },
+  {
+    id: "axes",
+    title: "Box axes or world axes",
+    group: "Tools",
+    keys: ["T"],
+    run: () => (store.axes.value = store.axes.value === "box" ? "world" : "box"),
+  },
+  { id: "upright", title: "Keep upright", group: "Tools", keys: ["U"], run: () => (store.upright.value = !store.upright.value) },
+  {
+    id: "snap",
+    title: "Snap to 1 mm and 1°",
+    group: "Tools",
+    keys: ["N"],
+    run: () => {
+      const on = store.snapLength.value === 0 && store.snapAngle.value === 0;
+      store.snapLength.value = on ? 0.001 : 0;
+      store.snapAngle.value = on ? 1 : 0;
+    },
+  },
+
+  ...arrows(),
+  { id: "ground", title: "Rest on the ground", group: "Box", keys: ["E"], run: () => onBox(actions.restOnGround), when: canEdit },
+  { id: "duplicate", title: "Duplicate", group: "Box", keys: ["Ctrl+D"], run: () => onBox(actions.duplicateBox), when: hasBox },
+  { id: "delete", title: "Delete", group: "Box", keys: ["Delete", "Backspace"], run: () => onBox(actions.deleteBox), when: canEdit },
+  {
+    id: "hide",
+    title: "Hide or show",
+    group: "Box",
+    keys: ["H"],
+    run: () => {
+      const id = store.selected.value;
+      const next = new Set(store.hidden.value);
+      if (id !== null && !next.delete(id)) next.add(id);
+      store.hidden.value = next;
+    },
+    when: hasBox,
+  },
+  {
+    id: "show-all",
+    title: "Show all boxes",
+    group: "Box",
+    keys: ["Shift+H"],
+    run: () => (store.hidden.value = new Set()),
+    when: () => store.hidden.value.size > 0,
+  },
+  {
+    id: "lock",
+    title: "Lock or unlock",
+    group: "Box",
+    keys: ["K"],
+    run: () => onBox((id) => actions.changeBox(id, { locked: !store.selectedBox.value?.locked })),
+    when: hasBox,
+  },
+  { id: "next-box", title: "Next box", group: "Box", keys: ["]"], run: () => stepBox(1), when: () => store.boxes.value.size > 0 },
+  { id: "previous-box", title: "Previous box", group: "Box", keys: ["["], run: () => stepBox(-1), when: () => store.boxes.value.size > 0 },
+
+  { id: "undo", title: "Undo", group: "Session", keys: ["Ctrl+Z"], run: () => void actions.undo() },
+  { id: "redo", title: "Redo", group: "Session", keys: ["Ctrl+Shift+Z", "Ctrl+Y"], run: () => void actions.redo() },
+  {
+    id: "history",
+    title: "History",
+    group: "Session",
+    keys: ["Y"],
+    run: () => (store.sidePanel.value = store.sidePanel.value === "history" ? "boxes" : "history"),
+  },
+  { id: "palette", title: "All commands", group: "Session", keys: ["Ctrl+K"], run: () => (store.overlay.value = "palette") },
+  { id: "help", title: "Keys", group: "Session", keys: ["?"], run: () => (store.overlay.value = "help") },
+  { id: "back", title: "Back out one step", group: "Session", keys: ["Escape"], run: backOut },
+];
+
+/** @param {number} step */
+function stepBox(step) {
+  const ids = [...store.boxes.value.keys()];
+  const at = ids.indexOf(store.selected.value ?? -1);
+  actions.select(ids[(at + step + (at < 0 && step < 0 ? 1 : 0) + ids.length) % ids.length]);
+}
+
+function backOut() {
+  if (store.overlay.value !== null) store.overlay.value = null;
+  else if (store.tool.value !== "select") store.tool.value = "select";
+  else if (store.selected.value !== null) store.selected.value = null;
+  else if (store.mode.value === "frame") actions.leaveFrame();
+  else if (store.mode.value !== "scene") goMode("scene");
+}
+
+/** @param {string} id */
+export function command(id) {
+  const found = commands.find((one) => one.id === id);
+  if (found === undefined) throw new Error(`there is no command ${id}`);
+  return found;
+}
+
+/**
+ * How a key event is written in `keys`: `Ctrl+Shift+Z`, `Shift+.`, `?`. Command on a Mac counts as Ctrl.
+ * @param {{key: string, code: string, ctrlKey: boolean, metaKey: boolean, shiftKey: boolean}} event
+ */
+export function chord({ key, code, ctrlKey, metaKey, shiftKey }) {
+  // Shift changes what these keys write, and keyboards differ in it: they are named by what they write without it.
+  const plain = { Comma: ",", Period: "." }[code];
+  const named = plain ?? (key.length === 1 ? key.toUpperCase() : key);
+  const withShift = shiftKey && (plain !== undefined || key.length > 1 || /\p{L}/u.test(key));
+  return `${ctrlKey || metaKey ? "Ctrl+" : ""}${withShift ? "Shift+" : ""}${named}`;
+}
+
+/**
+ * Run what a key stands for.
+ * @param {Parameters<typeof chord>[0] & {altKey: boolean}} event
+ * @returns {boolean} whether it stood for something that can be done now
+ */
+export function press(event) {
+  if (event.altKey) return false;
+  const written = chord(event);
+  const found = commands.find((one) => one.keys.includes(written) && (one.when?.() ?? true));
+  // What lies over the workspace has keys of its own.
+  if (found === undefined || (store.overlay.value !== null && found.id !== "back")) return false;
+  found.run();
+  return true;
+}

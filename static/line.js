@@ -1,0 +1,195 @@
+/** The live line of a session: what the server says goes into the store, the view goes to the scene. */
+
+import * as api from "./api.js";
+import { batch, effect } from "./lib/view.js";
+import * as store from "./store.js";
+
+/** @typedef {import("./store.js").Box} Box */
+/** @typedef {import("./store.js").ObjectClass} ObjectClass */
+
+/** Milliseconds until the next attempt, one after the other. */
+const PATIENCE = [200, 500, 1000, 2000, 4000];
+/** Closed for good: the session is not there, or this browser is logged out. */
+const HOPELESS = new Set([4404, 1008]);
+
+/** The page's own name, also that of its scene. */
+export const view = api.randomName();
+
+/** @type {{send: (message: object) => void, close: () => void} | null} */
+let line = null;
+let failures = 0;
+
+/** @param {object} message dropped while the line is lost: the view is sent whole when it is open again */
+export function send(message) {
+  line?.send(message);
+}
+
+/** Load the session and keep it up to date. Rejects with an ApiError where there is none. @param {string} sid */
+export async function follow(sid) {
+  store.sid.value = sid;
+  await load();
+  connect();
+  effect(sendView);
+  addEventListener("online", hurry);
+  document.addEventListener("visibilitychange", () => document.visibilityState === "visible" && hurry());
+}
+
+async function load() {
+  const sid = store.sid.value;
+  // The session first: edits made while the rest is read come again over the line, and change nothing twice.
+  const session = await api.session(sid);
+  const [boxes, classes] = await Promise.all([api.boxes(sid), api.classes(sid)]);
+  batch(() => {
+    store.session.value = session;
+    store.boxes.value = new Map(boxes.map((box) => [box.id, box]));
+    store.classes.value = new Map(classes.map((one) => [one.id, one]));
+    store.revision.value = session.revision;
+    if (!store.boxes.value.has(store.selected.value ?? -1)) store.selected.value = null;
+  });
+}
+
+/** @type {ReturnType<typeof setTimeout> | undefined} */
+let waiting;
+
+function connect() {
+  clearTimeout(waiting);
+  waiting = undefined;
+  line = api.openLine(store.sid.value, view, store.revision.value, {
+    opened: () => {
+      failures = 0;
+      store.line.value = "open";
+      store.setProblem("page", null);
+      sayHello();
+      sendView();
+    },
+    message: take,
+    closed: (code, reason) => {
+      line = null;
+      store.people.value = [];
+      store.line.value = "lost";
+      if (HOPELESS.has(code)) {
+        store.setProblem("page", reason || "The session cannot be reached any more. Load the page again.");
+        return;
+      }
+      waiting = setTimeout(connect, PATIENCE[Math.min(failures++, PATIENCE.length - 1)]);
+    },
+  });
+}
+
+/** Try again now: the laptop woke up, the network is back. */
+function hurry() {
+  if (waiting === undefined) return;
+  failures = 0;
+  connect();
+}
+
+/** The name that others see; kept in this browser. @param {string} name */
+export function introduce(name) {
+  localStorage.setItem("ars-web.name", name);
+  sayHello();
+}
+
+function sayHello() {
+  send({ type: "hello", name: localStorage.getItem("ars-web.name") ?? "" });
+}
+
+function sendView() {
+  send({
+    type: "view",
+    mode: store.mode.value === "frame" ? "frame" : "scene",
+    frame: store.frame.value,
+    selected: store.selected.value,
+    tool: store.tool.value === "points" ? "select" : store.tool.value,
+    axes: store.axes.value,
+    snap_length: store.snapLength.value,
+    snap_angle: (store.snapAngle.value * Math.PI) / 180,
+    upright: store.upright.value,
+    hidden: [...store.hidden.value],
+    dark: store.theme.value === "dark",
+  });
+}
+
+/** @param {any} message */
+function take(message) {
+  switch (message.type) {
+    case "ready":
+      return;
+    case "reset":
+      void load();
+      return;
+    case "edit":
+      batch(() => takeEdit(message.edit));
+      return;
+    case "gone":
+      store.setProblem("page", "This session was deleted. It can be brought back from the sessions page.");
+      return;
+    case "here":
+      store.people.value = message.people;
+      return;
+    case "picked":
+      batch(() => picked(message));
+      return;
+    case "entered":
+      if (message.frame === store.frame.value) store.entered.value = message.frame;
+      return;
+    case "dragged":
+      batch(() => takeDrag(message));
+      return;
+    case "conflicted":
+      batch(() => {
+        store.preview.value = null;
+        store.conflict.value = { box_id: message.yours.box_id, detail: message.detail, yours: message.yours, current: message.current };
+      });
+      return;
+    case "refused":
+      store.setProblem("scene", message.detail);
+      return;
+    default:
+      throw new Error(`the server sent a message of type ${message.type}`);
+  }
+}
+
+/** @param {{box_id: number | null, frame: number | null}} what */
+function picked({ box_id, frame }) {
+  store.setProblem("scene", null);
+  if (box_id !== null) store.selected.value = box_id;
+  else if (frame !== null) store.actions.enterFrame(frame);
+  else store.selected.value = null;
+}
+
+/** @param {any} message */
+function takeDrag(message) {
+  const going = message.phase === "start" || message.phase === "move";
+  store.preview.value = going
+    ? { box_id: message.box_id, T_world_box: message.T_world_box, size: message.size }
+    : null;
+  if (!message.own) return;
+  store.dragged.value = going ? { text: message.text, x: store.dragged.value?.x ?? 0, y: store.dragged.value?.y ?? 0 } : null;
+}
+
+/** @param {import("./store.js").Edit} edit */
+function takeEdit(edit) {
+  const boxes = new Map(store.boxes.value);
+  const classes = new Map(store.classes.value);
+  for (const change of edit.changes) {
+    if (change.kind === "box") put(boxes, edit.revision, /** @type {Box | null} */ (change.after), /** @type {number} */ (change.id));
+    else if (change.kind === "class") put(classes, edit.revision, /** @type {ObjectClass | null} */ (change.after), /** @type {number} */ (change.id));
+    else if (store.session.value !== null) store.session.value = { ...store.session.value, name: String(change.after) };
+  }
+  store.boxes.value = boxes;
+  store.classes.value = classes;
+  store.revision.value = Math.max(store.revision.value, edit.revision);
+  store.latestEdit.value = edit;
+  if (store.selected.value !== null && !boxes.has(store.selected.value)) store.selected.value = null;
+}
+
+/**
+ * @template {{revision: number}} T
+ * @param {Map<number, T>} things @param {number} revision @param {T | null} after @param {number} id
+ */
+function put(things, revision, after, id) {
+  const known = things.get(id);
+  if (known !== undefined && known.revision >= revision) return;
+  if (after === null) things.delete(id);
+  else things.set(id, after);
+}
