@@ -146,6 +146,7 @@ export function setProblem(place, text) {
  * @property {(boxes: {T_world_box: Transform, size: [number, number, number]}[], frames: number[]) => Promise<Schemas["FramePreview"][]>} labelsOf
  * @property {(index: number) => Promise<Schemas["LabelJson"][]>} frameLabels
  * @property {(index: number, options?: {width?: number, crop?: [number, number, number, number]}) => string} imageAddress
+ * @property {(index: number) => Promise<string>} imageProblem why a frame's image cannot be shown, in words
  * @property {(index: number) => Promise<string>} frameName
  * @property {() => Promise<Camera[]>} cameras
  * @property {(index: number) => Promise<Camera>} cameraOf a frame
