@@ -19,7 +19,21 @@ from starlette.concurrency import run_in_threadpool
 from starlette.staticfiles import StaticFiles
 
 from ars_web import __version__
-from ars_web.api import boxes, classes, exports, frames, health, history, live, login, openapi, problems, sessions
+from ars_web.api import (
+    boxes,
+    classes,
+    exports,
+    folders,
+    frames,
+    health,
+    history,
+    imports,
+    live,
+    login,
+    openapi,
+    problems,
+    sessions,
+)
 from ars_web.api.body_limit import BodyLimit
 from ars_web.api.credentials import CODE_LIFETIME, Cookies, LoginCodes, install_token
 from ars_web.api.dependencies import Services
@@ -30,7 +44,10 @@ from ars_web.api.security import Door, Guard
 from ars_web.datasets.exports import ExportJobs
 from ars_web.errors import BadInput, StoreError
 from ars_web.sessions.editing import SessionEditor
+from ars_web.sessions.import_jobs import ImportJobs
+from ars_web.sessions.import_looks import ImportLooks
 from ars_web.sessions.store import SessionStore
+from ars_web.sessions.uploads import Uploads
 from ars_web.settings import Settings
 from ars_web.workspace import BoxPreview, ViewAction, ViewEvent, ViewState
 
@@ -62,7 +79,7 @@ def create_app(settings: Settings) -> FastAPI:
     )
     static = static_folder()
     problems.install(app)
-    for module in (health, sessions, classes, frames, boxes, history, live, exports):
+    for module in (health, folders, imports, sessions, classes, frames, boxes, history, live, exports):
         app.include_router(module.router)
     app.include_router(login.router(static))
     openapi.install(app)
@@ -83,7 +100,10 @@ def _lifespan(settings: Settings) -> Callable[[FastAPI], AbstractAsyncContextMan
             jobs = ExportJobs(
                 settings.sessions, store.snapshot, executor_factory=make_executor, workers=settings.workers
             )
+            uploads = Uploads(settings.sessions)
+            import_jobs = ImportJobs(store, uploads)
             try:
+                uploads.sweep()
                 jobs.resume_unfinished()
                 editor = SessionEditor(store)
                 async with EventHub(store).running() as hub:
@@ -92,6 +112,9 @@ def _lifespan(settings: Settings) -> Callable[[FastAPI], AbstractAsyncContextMan
                         store=store,
                         editor=editor,
                         exports=jobs,
+                        uploads=uploads,
+                        looks=ImportLooks(),
+                        imports=import_jobs,
                         events=hub,
                         lines=LiveLines(),
                         presence=Presence(),
@@ -112,6 +135,7 @@ def _lifespan(settings: Settings) -> Callable[[FastAPI], AbstractAsyncContextMan
                     finally:
                         unlisten()
             finally:
+                await run_in_threadpool(import_jobs.close)
                 await run_in_threadpool(jobs.close)
 
     return lifespan
@@ -198,6 +222,7 @@ def serve(settings: Settings, *, on_ready: Callable[[str], None] | None = None) 
         finally:
             # Whoever interrupts a second time does not wait for the lifespan's end; an export must not keep it up.
             if hasattr(app.state, "services"):
+                app.state.services.imports.close()
                 app.state.services.exports.close()
 
 

@@ -5,8 +5,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from ars_web.api.problems import ProblemResponse
 
-UPLOAD_PATH = "/api/sessions/upload"
-"""Read piece by piece by its handler, which counts for itself."""
+UPLOAD_PATHS = frozenset({"/api/sessions/upload", "/api/imports/uploads"})
+"""Read piece by piece by their handlers, which count for themselves."""
 
 
 class BodyLimit:
@@ -18,7 +18,7 @@ class BodyLimit:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass on with the body in hand, or answer 413."""
-        if scope["type"] != "http" or scope["path"] == UPLOAD_PATH:
+        if scope["type"] != "http" or scope["path"] in UPLOAD_PATHS:
             await self.app(scope, receive, send)
             return
         declared = Headers(scope=scope).get("content-length", "0")

@@ -19,7 +19,10 @@ from ars_web.api.security import Door
 from ars_web.datasets.exports import ExportJobs
 from ars_web.errors import BadInput
 from ars_web.sessions.editing import SessionEditor
+from ars_web.sessions.import_jobs import ImportJobs
+from ars_web.sessions.import_looks import ImportLooks
 from ars_web.sessions.store import SessionStore
+from ars_web.sessions.uploads import Uploads
 from ars_web.workspace import SceneViews
 
 
@@ -28,6 +31,7 @@ class Services:
     """What one server works with, opened and closed by `app.py`.
 
     Attributes:
+        looks: recordings that were looked at before their import.
         lines: the live lines that are open.
         presence: who is at which session.
         scene: what the live lines show their pages.
@@ -40,6 +44,9 @@ class Services:
     store: SessionStore
     editor: SessionEditor
     exports: ExportJobs
+    uploads: Uploads
+    looks: ImportLooks
+    imports: ImportJobs
     events: EventHub
     lines: LiveLines
     presence: Presence

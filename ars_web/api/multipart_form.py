@@ -53,7 +53,7 @@ class MultipartForm:
         kind, options = parse_options_header(content_type)
         boundary = options.get(b"boundary")
         if kind != b"multipart/form-data" or not boundary:
-            raise BadInput(f"a multipart/form-data request is needed, with `file`, {', '.join(self._known)}")
+            raise BadInput(f"a multipart/form-data request is needed, with {', '.join(('`file`', *self._known))}")
         too_large = TooLarge(f"the upload is over {most} bytes; import the recording from a declared root instead")
         if declared is not None and declared.isdigit() and int(declared) > most:
             raise too_large

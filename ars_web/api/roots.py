@@ -1,8 +1,37 @@
-"""Relative paths that clients name, joined to roots that the server declared."""
+"""Relative paths that clients name, joined to roots that the server declared; where those lie is told to nobody."""
 
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
-from ars_web.errors import NotFound, RefusedPath
+from ars_web.errors import BadFile, BadInput, NotFound, RefusedPath, TooLarge
+from ars_web.recordings.options import ReadOptions
+
+
+def declared_root(roots: Mapping[str, Path], name: str) -> Path:
+    """The folder that was declared as `name` when the server started.
+
+    Raises:
+        BadInput: none was.
+    """
+    if name not in roots:
+        known = ", ".join(roots) or "none; start the server with --root NAME=PATH"
+        raise BadInput(f"root {name!r} was not declared; declared are: {known}")
+    return roots[name]
+
+
+@contextmanager
+def told_within(options: ReadOptions) -> Generator[None]:
+    """Errors raised in the block name their files as seen from `options.within`."""
+    try:
+        yield
+    except BadFile as error:
+        path = Path(options.told(str(error.path)))
+        # Its message begins with where it is, and so does the new one's.
+        where = f"{error.path}:{error.line}: " if error.line is not None else f"{error.path}: "
+        raise BadFile(path, options.told(str(error).removeprefix(where)), line=error.line) from error
+    except (BadInput, NotFound, RefusedPath, TooLarge) as error:
+        raise type(error)(options.told(str(error))) from error
 
 
 def safe_join(root: Path, relative: str) -> Path:

@@ -1,4 +1,4 @@
-"""`/api/sessions`: the sessions themselves; `/api/roots`: where new ones may come from."""
+"""`/api/sessions`: the sessions themselves."""
 
 from fastapi import APIRouter, Response
 
@@ -11,21 +11,15 @@ from ars_web.api.dependencies import (
     StrictRoute,
     etag,
 )
-from ars_web.api.models import RootJson, SessionChange, SessionDraft, SessionJson, SkippedFrameJson
+from ars_web.api.models import SessionChange, SessionDraft, SessionJson, SkippedFrameJson
 from ars_web.api.problems import documented
-from ars_web.api.roots import safe_join
-from ars_web.errors import BadInput, Conflict
+from ars_web.api.roots import declared_root, safe_join, told_within
+from ars_web.errors import Conflict
 from ars_web.recordings.options import ReadOptions
 from ars_web.recordings.registry import read_recording
 
 router = APIRouter(tags=["sessions"], route_class=StrictRoute)
 router.include_router(upload.router)
-
-
-@router.get("/api/roots", operation_id="roots-list", responses=documented())
-def roots(services: ServicesDep) -> list[RootJson]:
-    """The folders that recordings may be imported from, by the names that the server was started with."""
-    return [RootJson(name=name) for name in services.roots]
 
 
 @router.get("/api/sessions", operation_id="sessions-list", responses=documented())
@@ -40,12 +34,11 @@ def create(draft: SessionDraft, response: Response, services: ServicesDep, key: 
 
     Images stay where they are. Nothing outside the root is read.
     """
-    if draft.root not in services.roots:
-        known = ", ".join(services.roots) or "none; start the server with --root NAME=PATH"
-        raise BadInput(f"root {draft.root!r} was not declared; declared are: {known}")
-    root = services.roots[draft.root]
+    root = declared_root(services.roots, draft.root)
     path = safe_join(root, draft.path)
-    recording = read_recording(path, format=draft.format, options=ReadOptions(within=root))
+    options = ReadOptions(within=root)
+    with told_within(options):
+        recording = read_recording(path, format=draft.format, options=options)
     made = services.store.create(recording, name=draft.name, class_names=draft.classes, key=key)
     response.headers["Location"] = f"/api/sessions/{made.id}"
     response.headers["ETag"] = etag(made.revision)

@@ -1,7 +1,6 @@
 """`/api/sessions/upload`: a session from a zipped recording."""
 
 from contextlib import ExitStack
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +12,14 @@ from ars_web.api.dependencies import IdempotencyKey, Services, ServicesDep, etag
 from ars_web.api.models import Name, SessionJson
 from ars_web.api.multipart_form import MultipartForm
 from ars_web.api.problems import documented
+from ars_web.api.roots import told_within
 from ars_web.errors import BadInput
 from ars_web.recordings.options import ReadOptions
 from ars_web.recordings.registry import READERS, read_recording
 from ars_web.sessions.archive import extract_zip
 from ars_web.sessions.model import SessionSummary
 from ars_web.sessions.session_folders import unseen_folder
+from ars_web.sessions.uploads import as_uploaded, only_folder
 
 router = APIRouter(tags=["sessions"])
 
@@ -80,9 +81,10 @@ def _import(form: MultipartForm, unpacked: Path, services: Services, key: str | 
     fields = _checked(form.fields)
     extract_zip(form.archive, unpacked)
     form.archive.unlink()
-    recording = read_recording(_top(unpacked), format=fields.format, options=ReadOptions(within=unpacked))
-    # Where it was unpacked is gone in a moment; where it came from is what the client called it.
-    recording = replace(recording, source=Path(form.file_name or form.archive.name))
+    options = ReadOptions(within=unpacked)
+    with told_within(options):
+        recording = read_recording(only_folder(unpacked), format=fields.format, options=options)
+    recording = as_uploaded(recording, unpacked=unpacked, file_name=form.file_name or form.archive.name)
     return services.store.create(recording, name=fields.name, copy_images=True, key=key)
 
 
@@ -94,12 +96,3 @@ def _checked(fields: dict[str, bytes]) -> UploadFields:
     except ValidationError as error:
         faults = [f"{fault['loc'][0]}: {fault['msg']}" for fault in error.errors(include_input=False)]
         raise BadInput("; ".join(faults)) from error
-
-
-def _top(folder: Path) -> Path:
-    """The recording's own folder, where the zip holds it in one folder, or in several nested ones."""
-    while True:
-        entries = [entry for entry in folder.iterdir() if entry.name != "__MACOSX"]
-        if len(entries) != 1 or not entries[0].is_dir():
-            return folder
-        folder = entries[0]

@@ -71,6 +71,8 @@ def usable_frames(
             frames.append(Frame(name, image, frame.camera_id, Ts[row]))
         else:
             skipped.append(SkippedFrame(name, reason, frame.where))
+        if options.progress is not None:
+            options.progress(row + 1, len(listed))
     if not frames:
         first = skipped[0]
         raise BadFile(
