@@ -1,0 +1,46 @@
+/** The list of keys. */
+
+import { commands } from "../commands.js";
+import { Dialog } from "../lib/dialog.js";
+import { Icon } from "../lib/icon.js";
+import { html } from "../lib/view.js";
+import * as store from "../store.js";
+
+const NAMES = { Escape: "Esc", ArrowLeft: "←", ArrowRight: "→", ArrowUp: "↑", ArrowDown: "↓", PageUp: "PgUp", PageDown: "PgDn", Delete: "Del" };
+
+/** The keys of one chord. @param {{chord: string}} props */
+export function Keys({ chord }) {
+  return chord
+    .split(/\+(?=.)/)
+    .map((key) => html`<kbd key=${key}>${NAMES[/** @type {keyof NAMES} */ (key)] ?? key}</kbd>`);
+}
+
+/** Not keys of commands: what mouse and wheel do. */
+const POINTER = [
+  ["Scene: turn, pan, come nearer", "Drag, right drag, wheel"],
+  ["Frame: zoom, pan", "Wheel, drag"],
+  ["Scrub the strip closer or wider", "Ctrl+wheel"],
+  ["Step a number; ten times; a tenth", "Arrows; Shift; Alt"],
+];
+
+export function Help() {
+  const close = () => (store.overlay.value = null);
+  const groups = [...new Set(commands.map((one) => one.group))];
+  return html`<${Dialog} label="Keys" onClose=${close} class="wide">
+    <header><h2>Keys</h2><button class="button quiet icon-only" aria-label="Close" onClick=${close}><${Icon} name="x" /></button></header>
+    <div class="body key-list">
+      ${groups.map(
+        (group) => html`<section key=${group}>
+          <h3 class="heading">${group}</h3>
+          <dl>${commands
+            .filter((one) => one.group === group && one.keys.length > 0)
+            .map((one) => html`<div key=${one.id}><dt>${one.title}</dt><dd><${Keys} chord=${one.keys[0]} /></dd></div>`)}</dl>
+        </section>`,
+      )}
+      <section>
+        <h3 class="heading">Pointer</h3>
+        <dl>${POINTER.map(([what, how]) => html`<div key=${what}><dt>${what}</dt><dd>${how}</dd></div>`)}</dl>
+      </section>
+    </div>
+  </${Dialog}>`;
+}

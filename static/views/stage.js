@@ -1,0 +1,119 @@
+/** The centre: viser's scene in a frame of the same origin, and what lies over it. */
+
+import { command, press } from "../commands.js";
+import { Icon } from "../lib/icon.js";
+import { html, useEffect, useRef, useSignal, useSignalEffect } from "../lib/view.js";
+import * as store from "../store.js";
+import { PointsTool } from "./points_tool.js";
+import { ExportPanel } from "./export/panel.js";
+
+/** @param {{view: string}} props `view`: the name by which the server knows the page's scene */
+export function Stage({ view }) {
+  const frame = useRef(/** @type {HTMLIFrameElement | null} */ (null));
+  const ready = useSignal(false);
+
+  useEffect(() => {
+    /** @param {MessageEvent} event */
+    const hear = (event) => {
+      if (event.origin !== location.origin || event.source !== frame.current?.contentWindow) return;
+      const told = event.data;
+      if (told?.ars === "ready") {
+        ready.value = true;
+        tellBridge();
+      } else if (told?.ars === "key" && told.type === "keydown") {
+        press({ key: told.key, code: told.code, ctrlKey: told.ctrl, metaKey: told.meta, shiftKey: told.shift, altKey: told.alt });
+      } else if (told?.ars === "zoom") store.zoom.value = told.zoom;
+      else if (told?.ars === "pointer" && store.dragged.value !== null) {
+        store.dragged.value = { ...store.dragged.value, x: told.x, y: told.y };
+      }
+    };
+    addEventListener("message", hear);
+    return () => removeEventListener("message", hear);
+  }, []);
+
+  const tellBridge = () =>
+    frame.current?.contentWindow?.postMessage(
+      { ars: "view", mode: store.mode.value === "frame" ? "frame" : "scene", blend: store.blend.value, dark: store.theme.value === "dark" },
+      location.origin,
+    );
+  useSignalEffect(tellBridge);
+
+  const filled = store.mode.value === "export" || store.tool.value === "points";
+  return html`<main class="stage" aria-label="Scene">
+    <iframe
+      ref=${frame} title="3D scene: the tracked cameras and the virtual boxes" inert=${filled}
+      src=${`/scene/${encodeURIComponent(store.sid.value)}/${view}/?fixedDpr=${fixedRatio()}`}
+    ></iframe>
+    ${!ready.value && !filled && html`<div class="cover" role="status">Opening the scene</div>`}
+    ${!filled && html`<${Overlays} />`}
+    ${store.mode.value === "export" && html`<div class="filled"><${ExportPanel} /></div>`}
+    ${store.mode.value !== "export" && store.tool.value === "points" && html`<div class="filled"><${PointsTool} /></div>`}
+  </main>`;
+}
+
+/** viser lowers the resolution of slow scenes, which would move lines between pixels: it is told not to. */
+function fixedRatio() {
+  return Math.min(2, Math.max(1, devicePixelRatio));
+}
+
+function Overlays() {
+  const inFrame = store.mode.value === "frame";
+  const problem = store.problems.value.get("scene");
+  const drag = store.dragged.value;
+  return html`
+    <div class="corner top-left">
+      <div class="chip">
+        <strong>Frame ${store.frame.value}</strong>
+        <span class="muted">of ${Math.max(0, store.frames.value - 1)}</span>
+        ${inFrame && html`<${FrameName} />`}
+      </div>
+      ${inFrame
+        ? html`<div class="chip" title="Wheel: zoom. Drag: pan. 0: fit.">${store.zoom.value.toFixed(1)}x</div>
+            <button class="chip button" onClick=${() => store.actions.leaveFrame()} title="Leave the frame (F)">Leave</button>`
+        : html`<button class="chip button" onClick=${() => store.actions.enterFrame()} title="Enter this frame (F)">
+            <${Icon} name="image" size=${14} />Enter
+          </button>`}
+    </div>
+    <div class="corner bottom-left">
+      ${inFrame &&
+      html`<label class="chip">Photo
+        <input
+          type="range" min="0" max="1" step="0.05" value=${store.blend.value} aria-label="Photo over the 3D scene"
+          onInput=${(/** @type {any} */ event) => (store.blend.value = Number(event.currentTarget.value))}
+        />
+      </label>`}
+      <button class="chip button" aria-pressed=${store.snapLength.value > 0 || store.snapAngle.value > 0} onClick=${command("snap").run} title="Snap (N)">
+        ${snapWords()}
+      </button>
+      <button class="chip button" aria-pressed=${store.upright.value} onClick=${command("upright").run} title="Keep boxes upright (U)">Upright</button>
+    </div>
+    ${drag !== null && html`<div class="readout" style=${{ left: `${drag.x + 16}px`, top: `${drag.y + 12}px` }}>${drag.text}</div>`}
+    ${problem !== undefined &&
+    html`<div class="stage-problem">
+      <span class="problem" role="alert">${problem}</span>
+      <button class="button quiet icon-only" aria-label="Dismiss" onClick=${() => store.setProblem("scene", null)}><${Icon} name="x" /></button>
+    </div>`}
+  `;
+}
+
+function snapWords() {
+  const words = [
+    ...(store.snapLength.value > 0 ? [`${+(store.snapLength.value * 1000).toFixed(3)} mm`] : []),
+    ...(store.snapAngle.value > 0 ? [`${+store.snapAngle.value.toFixed(3)}°`] : []),
+  ];
+  return words.length > 0 ? `Snap ${words.join(", ")}` : "Snap off";
+}
+
+function FrameName() {
+  const name = useSignal("");
+  const index = store.frame.value;
+  useEffect(() => {
+    let current = true;
+    store.actions.frameName(index).then(
+      (found) => current && (name.value = found),
+      () => current && (name.value = ""), // the page says already that the server does not answer
+    );
+    return () => void (current = false);
+  }, [index]);
+  return html`<span class="muted">${name.value}</span>`;
+}
