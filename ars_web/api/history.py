@@ -7,12 +7,27 @@ from fastapi.responses import StreamingResponse
 from starlette.concurrency import run_in_threadpool
 
 from ars_web.api.dependencies import AuthorDep, IdempotencyKey, ServicesDep, StrictRoute, etag
-from ars_web.api.models import EditJson
+from ars_web.api.models import EditJson, HistoryPage
 from ars_web.api.problems import documented
 
 router = APIRouter(prefix="/api/sessions/{sid}", tags=["history"], route_class=StrictRoute)
 
 Revision = Annotated[int | None, Query(ge=0, lt=2**53, description="the last revision that the client has")]
+
+
+@router.get("/history", operation_id="history-list", responses=documented(404))
+def history(
+    sid: str,
+    response: Response,
+    services: ServicesDep,
+    author: AuthorDep,
+    limit: Annotated[int, Query(ge=1, le=500)] = 50,
+    before: Annotated[int | None, Query(ge=1, lt=2**53, description="only edits below this revision")] = None,
+) -> HistoryPage:
+    """What was done in the session, the newest first; `before` the last one's revision for those that follow."""
+    found = services.store.history(sid, author=author, before=before, limit=limit)
+    response.headers["ETag"] = etag(found.revision)
+    return HistoryPage.of(found, author=author)
 
 
 @router.post("/undo", operation_id="history-undo", responses=documented(404, 409))

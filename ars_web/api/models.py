@@ -22,6 +22,7 @@ from ars_web.geometry.rigid_transform import wxyz_from_rotation
 from ars_web.recordings.registry import READERS
 from ars_web.sessions.boxes_json import Id, Size, box_json, class_json
 from ars_web.sessions.edits import BoxChange, Change, ClassChange, Edit
+from ars_web.sessions.history import History
 from ars_web.sessions.model import FrameTable, ObjectClass, SessionSummary, VirtualBox
 from ars_web.sessions.names import LONGEST_NAME
 
@@ -281,6 +282,49 @@ class EditJson(BaseModel):
             redoes=edit.redoes,
             at=edit.at,
             changes=[_change_json(change) for change in edit.changes],
+        )
+
+
+class PastEdit(EditJson):
+    """One entry of the session's history, as it stands now."""
+
+    undone: bool = Field(description="its effect was taken back, by a later undo (or, of an undo, redo) that stands")
+    own: bool = Field(description="made by the caller, whose undo and redo are about own edits only")
+
+
+class EditName(BaseModel):
+    """An edit, by its revision."""
+
+    revision: int
+    summary: str = Field(description="what was done, such as `Move cube`, without saying that it was undone or redone")
+
+    @classmethod
+    def of(cls, edit: Edit | None) -> "EditName | None":
+        """The JSON of an edit, if there is one."""
+        return None if edit is None else cls(revision=edit.revision, summary=edit.deed)
+
+
+class HistoryPage(BaseModel):
+    """Some of a session's history."""
+
+    items: list[PastEdit] = Field(description="newest first")
+    can_undo: EditName | None = Field(description="the edit that the caller's undo would take back")
+    can_redo: EditName | None = Field(description="the undo that the caller's redo would take back")
+
+    @classmethod
+    def of(cls, history: History, *, author: str) -> "HistoryPage":
+        """The JSON of a history, for `author`."""
+        return cls(
+            items=[
+                PastEdit(
+                    **EditJson.of(edit).model_dump(),
+                    undone=edit.revision in history.taken_back,
+                    own=edit.author == author,
+                )
+                for edit in history.edits
+            ],
+            can_undo=EditName.of(history.can_undo),
+            can_redo=EditName.of(history.can_redo),
         )
 
 

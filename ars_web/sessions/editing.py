@@ -342,7 +342,7 @@ class SessionEditor:
             session,
             changes,
             author=author,
-            summary=f"{verb}: {edit.summary.removeprefix('Undo: ').removeprefix('Redo: ')}",
+            summary=f"{verb}: {edit.deed}",
             undoes=edit.revision if verb == "Undo" else None,
             redoes=edit.revision if verb == "Redo" else None,
         )

@@ -67,6 +67,13 @@ class Edit:
     redoes: int | None
     at: datetime
 
+    @property
+    def deed(self) -> str:
+        """What was done, taken back or made again: `Move cube`, also of `Undo: Move cube`."""
+        if self.undoes is None and self.redoes is None:
+            return self.summary
+        return self.summary.removeprefix("Undo: ").removeprefix("Redo: ")
+
 
 Thing = VirtualBox | ObjectClass
 T = TypeVar("T", VirtualBox, ObjectClass)

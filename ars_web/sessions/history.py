@@ -1,7 +1,10 @@
-"""Which edit an author's undo or redo is about. Each author has one line of history, as in any editor."""
+"""Which edits stand, and which one an author's undo or redo is about. Each author has one line of history, as in any
+editor."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+
+from ars_web.sessions.edits import Edit
 
 
 @dataclass(frozen=True)
@@ -11,6 +14,24 @@ class LogEntry:
     revision: int
     undoes: int | None
     redoes: int | None
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """Some of a session's log, as one author sees it.
+
+    Attributes:
+        revision: of the session.
+        edits: newest first.
+        taken_back: revisions of those edits whose effect does not stand any more.
+        can_undo, can_redo: what the author's next undo or redo is about; None: nothing.
+    """
+
+    revision: int
+    edits: tuple[Edit, ...]
+    taken_back: frozenset[int]
+    can_undo: Edit | None
+    can_redo: Edit | None
 
 
 def to_undo(newest_first: Iterable[LogEntry]) -> int | None:
@@ -23,6 +44,19 @@ def to_undo(newest_first: Iterable[LogEntry]) -> int | None:
             return entry.revision
         taken_back.add(entry.undoes)
     return None
+
+
+def taken_back(newest_first: Iterable[LogEntry]) -> set[int]:
+    """The revisions, of these or earlier edits, whose effect does not stand: undone, or redone and undone again.
+
+    An undo is taken back by its redo, and a redo by an undo of it, so newer edits are settled before older ones.
+    """
+    gone: set[int] = set()
+    for entry in newest_first:
+        inverted = entry.redoes if entry.undoes is None else entry.undoes
+        if inverted is not None and entry.revision not in gone:
+            gone.add(inverted)
+    return gone
 
 
 def to_redo(newest_first: Iterable[LogEntry]) -> int | None:

@@ -1,6 +1,6 @@
 """A session's rows as the model's records, and back. Every query and statement is here."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import orjson
 from jaxtyping import Float
-from sqlalchemy import Connection, Row, delete, func, insert, select, update
+from sqlalchemy import Connection, Row, and_, delete, func, insert, or_, select, update
 from sqlalchemy.dialects.sqlite import insert as upsert
 
 from ars_web.errors import StoreError
@@ -137,6 +137,34 @@ def load_edits(connection: Connection, *, after: int = 0, limit: int | None = No
         _edit(row)
         for row in connection.execute(select(e).where(e.c.revision > after).order_by(e.c.revision).limit(limit))
     ]
+
+
+def load_newest_edits(connection: Connection, *, before: int | None, limit: int) -> list[Edit]:
+    """The log's `limit` newest entries with a revision below `before` (None: of all), newest first."""
+    e = tables.edit
+    newest = select(e).order_by(e.c.revision.desc()).limit(limit)
+    return [_edit(row) for row in connection.execute(newest if before is None else newest.where(e.c.revision < before))]
+
+
+def load_inversions(connection: Connection, edits: Sequence[Edit]) -> list[LogEntry]:
+    """The later undos and redos that bear on whether these edits stand, newest first; found by index."""
+    e = tables.edit.c
+    if not edits:
+        return []
+    newest = max(edit.revision for edit in edits)
+    revisions = [edit.revision for edit in edits]
+    # A later inversion of one of the edits, an inversion of that one, and so on. Their own ones are at hand.
+    found = (
+        select(e.revision, e.undoes, e.redoes)
+        .where(or_(e.undoes.in_(revisions), e.redoes.in_(revisions)), e.revision > newest)
+        .cte(recursive=True)
+    )
+    inverts = or_(e.undoes == found.c.revision, e.redoes == found.c.revision)
+    # An edit inverts an earlier one. A damaged log may say otherwise, and the search must end.
+    following = select(e.revision, e.undoes, e.redoes).join(found, and_(inverts, e.revision > found.c.revision))
+    everything = found.union(following)
+    chosen = select(everything).order_by(everything.c.revision.desc())
+    return [LogEntry(revision, undoes, redoes) for revision, undoes, redoes in connection.execute(chosen)]
 
 
 def load_edit(connection: Connection, revision: int) -> Edit:

@@ -19,6 +19,7 @@ from ars_web.sessions import rows, session_folders
 from ars_web.sessions.checking import check_session
 from ars_web.sessions.database import Database
 from ars_web.sessions.edits import Edit, apply
+from ars_web.sessions.history import History, LogEntry, taken_back, to_redo, to_undo
 from ars_web.sessions.importing import fill, starting_state
 from ars_web.sessions.migration import back_up
 from ars_web.sessions.model import FrameTable, SessionSnapshot, SessionState, SessionSummary
@@ -112,6 +113,21 @@ class SessionStore:
         """The log's entries that made the revisions above `after`, oldest first, at most `limit` of them."""
         with self._reading(sid) as (connection, _):
             return rows.load_edits(connection, after=after, limit=limit)
+
+    def history(self, sid: str, *, author: str, before: int | None = None, limit: int = 50) -> History:
+        """The `limit` newest of the log's entries below revision `before`, and what `author` could undo and redo."""
+        with self._reading(sid) as (connection, _):
+            edits = rows.load_newest_edits(connection, before=before, limit=limit)
+            own = [LogEntry(edit.revision, edit.undoes, edit.redoes) for edit in edits]
+            gone = taken_back([*rows.load_inversions(connection, edits), *own])
+            undo, redo = (choose(rows.newest_entries(connection, author=author)) for choose in (to_undo, to_redo))
+            return History(
+                revision=rows.load_revision(connection),
+                edits=tuple(edits),
+                taken_back=frozenset(gone & {edit.revision for edit in edits}),
+                can_undo=None if undo is None else rows.load_edit(connection, undo),
+                can_redo=None if redo is None else rows.load_edit(connection, redo),
+            )
 
     def check(self) -> list[str]:
         """What is wrong with the sessions folder and each session, in words with the remedy; empty if nothing is."""

@@ -18,7 +18,7 @@ def test_a_box_is_made_changed_and_deleted(client: httpx.Client, path: str, box_
     made = client.post(path, json={**box_json, "name": "left"})
     assert (made.status_code, made.headers["etag"]) == (201, '"1"')
     one = made.headers["location"]
-    assert made.json() == {**box_json, "id": 1, "name": "left", "has_hull": False, "revision": 1}
+    assert made.json() == {**box_json, "id": 1, "name": "left", "has_hull": False, "locked": False, "revision": 1}
     assert client.get(one).json() == made.json()
     assert client.get(one).headers["etag"] == '"1"'
     assert client.get(path).json() == [made.json()]
@@ -64,6 +64,9 @@ BAD_BOXES: list[dict[str, Any]] = [
     {"name": "two\nlines"},
     {"colour": 1},
     {"id": 5},
+    {"locked": None},
+    {"locked": 1},
+    {"locked": "true"},
     {"T_world_box": {"position": [0, 0, 0], "wxyz": [0, 0, 0, 0]}},
     {"T_world_box": {"position": [0, 0], "wxyz": [1, 0, 0, 0]}},
     {"T_world_box": {"position": [0, 0, 0]}},
@@ -199,3 +202,52 @@ def test_an_unknown_box_is_not_found(client: httpx.Client, path: str, box_id: st
     assert client.get(f"{path}/{box_id}").status_code == status
     assert client.patch(f"{path}/{box_id}", json={}, headers={"If-Match": '"0"'}).status_code == status
     assert client.delete(f"{path}/{box_id}", headers={"If-Match": '"0"'}).status_code == status
+
+
+def test_a_locked_box_is_kept_until_it_is_unlocked(client: httpx.Client, path: str, box_json: dict[str, Any]) -> None:
+    client.post(path, json=box_json)
+    locked = client.patch(f"{path}/1", json={"locked": True}, headers={"If-Match": '"1"'})
+    assert (locked.status_code, locked.json()["locked"], locked.json()["revision"]) == (200, True, 2)
+    now = {"If-Match": '"2"'}
+    for refused in (
+        client.patch(f"{path}/1", json={"size": [1, 2, 3]}, headers=now),
+        client.delete(f"{path}/1", headers=now),
+        client.post(f"{path}/1/to-ground", headers=now),
+    ):
+        assert (refused.status_code, refused.json()["type"]) == (409, "urn:ars-web:problem:locked")
+        assert "unlock it before" in refused.json()["detail"]
+    assert client.patch(f"{path}/1", json={"size": [1, 2, 3]}, headers={"If-Match": '"1"'}).status_code == 412
+    renamed = client.patch(f"{path}/1", json={"name": "left"}, headers=now).json()
+    assert (renamed["name"], renamed["locked"], renamed["revision"]) == ("left", True, 3)
+    change = {"locked": False, "size": [1, 2, 3]}
+    opened = client.patch(f"{path}/1", json=change, headers={"If-Match": '"3"'}).json()
+    assert (opened["locked"], opened["size"]) == (False, [1, 2, 3])
+    assert client.post(path, json={**box_json, "locked": True}).json()["locked"] is True
+
+
+def test_a_duplicate_lies_10_mm_beside(client: httpx.Client, path: str, box_json: dict[str, Any]) -> None:
+    box_json["T_world_box"] = {"position": [1, 2, 3], "wxyz": [0.5**0.5, 0, 0, 0.5**0.5]}  # its x is the world's y
+    client.post(path, json={**box_json, "name": "left", "locked": True})
+    key = {"Idempotency-Key": "k"}
+    made = client.post(f"{path}/1/duplicate", headers=key)
+    assert (made.status_code, made.headers["etag"]) == (201, '"2"')
+    assert made.headers["location"] == f"{path}/2"
+    box = made.json()
+    assert (box["id"], box["name"], box["locked"], box["size"]) == (2, "left 2", False, [0.2, 0.2, 0.2])
+    assert box["T_world_box"]["position"] == pytest.approx([1, 2.21, 3])
+    assert client.post(f"{path}/1/duplicate", headers=key).json() == box
+    assert client.post(f"{path}/1/duplicate", json={"offset": "beside"}).json()["name"] == "left 3"
+    assert client.post(f"{path}/1/duplicate", json={"offset": "far"}).status_code == 422
+    assert client.post(f"{path}/9/duplicate").status_code == 404
+
+
+def test_a_box_is_put_on_the_ground(client: httpx.Client, path: str, box_json: dict[str, Any]) -> None:
+    client.post(path, json=box_json)
+    assert client.post(f"{path}/1/to-ground").status_code == 428
+    key = {"If-Match": '"1"', "Idempotency-Key": "k"}
+    resting = client.post(f"{path}/1/to-ground", headers=key)
+    assert (resting.status_code, resting.headers["etag"]) == (200, '"2"')
+    assert resting.json()["T_world_box"]["position"] == pytest.approx([0, 0, 0.1])
+    assert client.post(f"{path}/1/to-ground", headers=key).json() == resting.json()
+    stale = client.post(f"{path}/1/to-ground", headers={"If-Match": '"1"'})
+    assert (stale.status_code, stale.json()["current"]) == (412, resting.json())

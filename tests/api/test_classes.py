@@ -71,3 +71,18 @@ def test_an_unknown_class_is_not_found(client: httpx.Client, sid: str, class_id:
     path = f"/api/sessions/{sid}/classes/{class_id}"
     assert client.get(path).status_code == 404
     assert client.patch(path, json={"name": "x"}, headers={"If-Match": '"0"'}).status_code == 404
+
+
+def test_a_class_has_a_usual_size(client: httpx.Client, sid: str) -> None:
+    path = f"/api/sessions/{sid}/classes"
+    sized = client.patch(f"{path}/0", json={"default_size": [0.1, 0.2, 0.3]}, headers={"If-Match": '"0"'})
+    assert (sized.status_code, sized.json()["default_size"]) == (200, [0.1, 0.2, 0.3])
+    kept = client.patch(f"{path}/0", json={"name": "brick"}, headers={"If-Match": '"1"'})
+    assert kept.json()["default_size"] == [0.1, 0.2, 0.3]
+    for bad in ([0, 1, 1], [1, 1], [1, 1, "1"], [True, 1, 1], 3, "x"):
+        answer = client.patch(f"{path}/0", json={"default_size": bad}, headers={"If-Match": '"2"'})
+        assert answer.status_code == 422, bad
+    assert client.get(f"{path}/0").headers["etag"] == '"2"'
+    cleared = client.patch(f"{path}/0", json={"default_size": None}, headers={"If-Match": '"2"'})
+    assert (cleared.json()["default_size"], cleared.json()["revision"]) == (None, 3)
+    assert client.post(path, json={"name": "ball", "default_size": [1, 1, 1]}).json()["default_size"] == [1, 1, 1]

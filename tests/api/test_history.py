@@ -31,6 +31,45 @@ def test_undo_and_redo_are_new_revisions(client: httpx.Client, path: str, box_js
     assert client.get(f"{path}/boxes").json() == [change["after"]]
 
 
+def test_the_history_says_what_was_done_and_what_stands(
+    server, client: httpx.Client, path: str, box_json: dict[str, Any]
+) -> None:
+    empty = client.get(f"{path}/history")
+    assert empty.json() == {"items": [], "can_undo": None, "can_redo": None}
+    assert empty.headers["etag"] == '"0"'
+    client.post(f"{path}/boxes", json=box_json)
+    client.patch(f"{path}/boxes/1", json={"name": "left"}, headers={"If-Match": '"1"'})
+    undo = client.post(f"{path}/undo").json()
+    with server.browser() as page:
+        page.post(f"{path}/boxes", json=box_json)
+        theirs = page.get(f"{path}/history").json()
+    found = client.get(f"{path}/history")
+    assert found.headers["etag"] == '"4"'
+    items = found.json()["items"]
+    assert [(i["revision"], i["summary"], i["undone"], i["own"]) for i in items] == [
+        (4, "Add cube 2", False, False),
+        (3, "Undo: Rename cube", False, True),
+        (2, "Rename cube", True, True),
+        (1, "Add cube", False, True),
+    ]
+    assert {key: items[1][key] for key in undo} == undo
+    assert found.json()["can_undo"] == {"revision": 1, "summary": "Add cube"}
+    assert found.json()["can_redo"] == {"revision": 3, "summary": "Rename cube"}
+    assert [i["own"] for i in theirs["items"]] == [True, False, False, False]
+    assert (theirs["can_undo"], theirs["can_redo"]) == ({"revision": 4, "summary": "Add cube 2"}, None)
+    page_of_two = client.get(f"{path}/history", params={"limit": 2, "before": 3}).json()["items"]
+    assert page_of_two == items[2:]
+    client.post(f"{path}/redo")
+    again = client.get(f"{path}/history").json()
+    assert [(i["revision"], i["undone"]) for i in again["items"]] == [
+        (5, False), (4, False), (3, True), (2, False), (1, False),
+    ]  # fmt: skip
+    assert (again["can_undo"], again["can_redo"]) == ({"revision": 5, "summary": "Rename cube"}, None)
+    for bad in ({"limit": 0}, {"limit": 501}, {"before": 0}, {"before": "x"}):
+        assert client.get(f"{path}/history", params=bad).status_code == 422
+    assert client.get("/api/sessions/nope/history").status_code == 404
+
+
 def test_nothing_to_undo_is_a_conflict(client: httpx.Client, path: str) -> None:
     for verb in ("undo", "redo"):
         answer = client.post(f"{path}/{verb}")
