@@ -52,10 +52,10 @@ export const skipped = (sid) => request("GET", under(sid, "/skipped"));
 /** @returns {Promise<Schemas["RootJson"][]>} */
 export const roots = () => request("GET", "/api/roots");
 
-/** @param {string} root @param {string} path @returns {Promise<Schemas["FolderPage"]>} */
+/** @param {string} root @param {string} path @returns {Promise<Schemas["FoldersJson"]>} */
 export const folders = (root, path) => request("GET", `/api/roots/${encodeURIComponent(root)}/folders?${query({ path })}`);
 
-/** @param {object} source {root, path, format?} or {upload, format?} @returns {Promise<Schemas["LookAnswer"]>} */
+/** @param {object} source {root, path, format?} or {upload, format?} @returns {Promise<Schemas["LookJson"]>} */
 export const lookAtRecording = (source) => request("POST", "/api/imports/look", { body: source });
 
 /**
@@ -80,7 +80,7 @@ export const cancelImport = (id) => request("POST", `/api/imports/${encodeURICom
  * @param {File} file
  * @param {(sent: number, total: number) => void} onProgress
  * @param {AbortSignal} [signal]
- * @returns {Promise<Schemas["UploadAnswer"]>}
+ * @returns {Promise<Schemas["UploadJson"]>}
  */
 export function upload(file, onProgress, signal) {
   return new Promise((resolve, reject) => {
@@ -185,6 +185,17 @@ export const epipolar = (sid, of, frame) =>
 export const imageAddress = (sid, index, options = {}) =>
   under(sid, `/frames/${index}/image?${query({ width: options.width, crop: options.crop?.join(",") })}`);
 
+/** Why a frame's image cannot be shown, in words: an <img> does not tell. @param {string} sid @param {number} index */
+export async function imageProblem(sid, index) {
+  try {
+    await request("GET", imageAddress(sid, index, { width: 16 }), { parsed: false });
+    return "The image could not be loaded just now. Try again.";
+  } catch (error) {
+    if (error instanceof ApiError) return error.message;
+    throw error;
+  }
+}
+
 // Exports.
 
 /** @returns {Promise<Schemas["FormatsAnswer"]>} */
@@ -250,11 +261,12 @@ function query(values) {
 /**
  * @param {string} method
  * @param {string} address
- * @param {{body?: object, revision?: number, key?: boolean, signal?: AbortSignal}} [options] `revision`: what the
- *   change was made to; `key`: a repeat after a lost answer must not do it twice
+ * @param {{body?: object, revision?: number, key?: boolean, signal?: AbortSignal, parsed?: boolean}} [options]
+ *   `revision`: what the change was made to; `key`: a repeat after a lost answer must not do it twice; `parsed`: the
+ *   answer is JSON
  * @returns {Promise<any>}
  */
-async function request(method, address, { body, revision, key, signal } = {}) {
+async function request(method, address, { body, revision, key, signal, parsed = true } = {}) {
   /** @type {Record<string, string>} */
   const headers = {};
   if (body !== undefined) headers["Content-Type"] = "application/json";
@@ -272,7 +284,7 @@ async function request(method, address, { body, revision, key, signal } = {}) {
     if (error instanceof DOMException && error.name === "AbortError") throw error;
     throw new ApiError("The server does not answer. Is it still running?", 0);
   }
-  if (response.ok) return response.status === 204 ? undefined : response.json();
+  if (response.ok) return response.status === 204 || !parsed ? undefined : response.json();
   throw failure(response.status, await response.json().catch(() => ({})));
 }
 

@@ -61,7 +61,7 @@ function arrow(axis, sign, times) {
     const step = along(sign * 0.001 * times);
     actions.editBox(box.id, {
       T_world_box: box.T_world_box,
-      size: [0, 1, 2].map((i) => Math.max(0.001, box.size[i] + step[i])) /** @type {any} */,
+      size: /** @type {[number, number, number]} */ ([0, 1, 2].map((i) => Math.max(0.001, box.size[i] + step[i]))),
     });
   } else {
     actions.nudge(along(sign * 0.001 * times), [0, 0, 0]);

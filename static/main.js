@@ -1,33 +1,185 @@
-// @ts-check
 /** Joins the server's answers and the views. */
 
 import * as api from "./api.js";
-import { failure, noSessions, sessionList } from "./views/sessions.js";
+import { press } from "./commands.js";
+import * as editing from "./editing.js";
+import { followTheme } from "./lib/theme.js";
+import { effect, h, render } from "./lib/view.js";
+import * as line from "./line.js";
+import * as store from "./store.js";
 
-const place = /** @type {HTMLElement} */ (document.getElementById("sessions"));
-const count = /** @type {HTMLElement} */ (document.getElementById("count"));
-const version = /** @type {HTMLElement} */ (document.getElementById("version"));
+const PAGE = /** @type {HTMLElement} */ (document.getElementById("page"));
+/** How many names of frames are asked for at once. */
+const NAMES = 200;
 
-async function show() {
-  place.setAttribute("aria-busy", "true");
+const sid = () => store.sid.value;
+
+Object.assign(
+  store.actions,
+  /** @satisfies {import("./store.js").Actions} */ ({
+    changeBox: editing.changeBox,
+    editBox: editing.editBox,
+    finishEdit: editing.finishEdit,
+    nudge: editing.nudge,
+    deleteBox: editing.deleteBox,
+    duplicateBox: editing.duplicateBox,
+    restOnGround: editing.restOnGround,
+    newBox: (classId) => line.send({ type: "new-box", class_id: classId }),
+    boxFromPoints: editing.boxFromPoints,
+    locatePoint: (observations) => api.locatePoint(sid(), observations),
+    epipolar: (of, frame) => api.epipolar(sid(), of, frame),
+    addClass: editing.addClass,
+    changeClass: editing.changeClass,
+    deleteClass: editing.deleteClass,
+    overrule: editing.overrule,
+    undo: () => editing.stepHistory("undo"),
+    redo: () => editing.stepHistory("redo"),
+    history: (before) => api.history(sid(), before),
+    renameSession: editing.renameSession,
+
+    goTo,
+    enterFrame: (index) => {
+      if (index !== undefined) goTo(index);
+      store.tool.value = store.tool.value === "points" ? "select" : store.tool.value;
+      store.mode.value = "frame";
+    },
+    leaveFrame: () => (store.mode.value = "scene"),
+    look: (at) => {
+      if (store.mode.value !== "scene") store.mode.value = "scene";
+      line.send({ type: "look", at });
+    },
+    select: (id) => (store.selected.value = id),
+    tellingFrames: (id) => api.tellingFrames(sid(), id),
+    labelsOf: (boxes, frames) => api.labelsOf(sid(), boxes, frames),
+    frameLabels: (index) => api.frameLabels(sid(), index),
+    imageAddress: (index, options) => api.imageAddress(sid(), index, options),
+    imageProblem: (index) => api.imageProblem(sid(), index),
+    frameName: async (index) => (await framesAround(index))[index % NAMES]?.name ?? "",
+    cameras,
+    cameraOf: async (index) => {
+      const { camera_id } = (await framesAround(index))[index % NAMES];
+      const found = (await cameras()).find((camera) => camera.id === camera_id);
+      if (found === undefined) throw new Error(`frame ${index} names camera ${camera_id}, which the session does not have`);
+      return found;
+    },
+
+    formats: api.formats,
+    previewExport: (format, options, signal) => api.previewExport(sid(), format, options, signal),
+    startExport: (format, options) => api.startExport(sid(), format, options),
+    exports: () => api.exports(sid()),
+    exportState: api.exportState,
+    cancelExport: api.cancelExport,
+    removeExport: api.removeExport,
+    downloadAddress: api.downloadAddress,
+
+    sessions: api.sessions,
+    renameOf: (session, name) => api.renameSession(session.id, session.revision, name),
+    deleteSession: (session) => api.deleteSession(session.id, session.revision),
+    restoreSession: api.restoreSession,
+    thumbnailAddress: (id, index, width) => api.imageAddress(id, index, { width }),
+    roots: api.roots,
+    folders: api.folders,
+    lookAtRecording: api.lookAtRecording,
+    lookImageAddress: api.lookImageAddress,
+    upload: api.upload,
+    startImport: api.startImport,
+    importState: api.importState,
+    cancelImport: api.cancelImport,
+    health: api.health,
+  }),
+);
+
+/** @type {Promise<store.Camera[]> | undefined} */
+let knownCameras;
+/** Recordings do not change: cameras and frames are asked for once. @type {Map<number, Promise<store.Schemas["FrameJson"][]>>} */
+const knownFrames = new Map();
+
+function cameras() {
+  knownCameras ??= api.cameras(sid());
+  return knownCameras;
+}
+
+/** The frames of the block that `index` is in. @param {number} index */
+function framesAround(index) {
+  const block = Math.floor(index / NAMES);
+  let found = knownFrames.get(block);
+  if (found === undefined) {
+    found = api.frames(sid(), block * NAMES, NAMES).then((page) => page.items);
+    found.catch(() => knownFrames.delete(block));
+    knownFrames.set(block, found);
+  }
+  return found;
+}
+
+/** @param {number} index */
+function goTo(index) {
+  store.frame.value = Math.max(0, Math.min(store.frames.value - 1, Math.round(index)));
+}
+
+/** @param {string} id */
+async function openWorkspace(id) {
+  const [{ Workspace }] = await Promise.all([import("./views/workspace.js"), line.follow(id)]);
+  editing.connect(line.send);
+  restoreView();
+  document.title = "ARS Web";
+  effect(() => void (document.title = `${store.session.value?.name ?? ""} · ARS Web`));
+  effect(keepView);
+  addEventListener("keydown", (event) => {
+    if (!isTyping(event.target) && press(event)) event.preventDefault();
+  });
+  addEventListener("beforeunload", (event) => {
+    void editing.finishEdit();
+    if (store.unsaved.value > 0) event.preventDefault();
+  });
+  render(h(Workspace, { view: line.view }), PAGE);
+}
+
+/** Whether a key goes into text. @param {EventTarget | null} target */
+function isTyping(target) {
+  if (!(target instanceof HTMLElement)) return false;
+  const takesText = target instanceof HTMLInputElement && !["range", "checkbox", "radio", "color"].includes(target.type);
+  return takesText || target instanceof HTMLTextAreaElement || target instanceof HTMLSelectElement || target.isContentEditable;
+}
+
+/** The place in the recording is part of the address: a reload, or whom it is sent to, comes back to it. */
+function keepView() {
+  const parts = new URLSearchParams();
+  parts.set("frame", String(store.frame.value));
+  if (store.mode.value !== "scene") parts.set("mode", store.mode.value);
+  if (store.selected.value !== null) parts.set("box", String(store.selected.value));
+  clearTimeout(keeping);
+  // Browsers refuse hundreds of these a minute, which scrubbing would be.
+  keeping = setTimeout(() => history.replaceState(null, "", `#${parts}`), 300);
+}
+/** @type {ReturnType<typeof setTimeout> | undefined} */
+let keeping;
+
+function restoreView() {
+  const parts = new URLSearchParams(location.hash.slice(1));
+  const mode = parts.get("mode");
+  const box = Number(parts.get("box") ?? NaN);
+  goTo(Number(parts.get("frame") ?? Math.floor(store.frames.value / 2)) || 0);
+  if (mode === "frame" || mode === "export") store.mode.value = mode;
+  if (store.boxes.value.has(box)) store.selected.value = box;
+}
+
+async function openSessions() {
+  const { SessionsPage } = await import("./views/sessions/page.js");
+  render(h(SessionsPage, {}), PAGE);
+}
+
+async function open() {
+  followTheme(store.theme);
+  const inside = location.pathname.match(/^\/sessions\/([^/]+)\/?$/);
   try {
-    const sessions = await api.sessions();
-    count.textContent = sessions.length === 0 ? "" : String(sessions.length);
-    place.replaceChildren(sessions.length === 0 ? noSessions() : sessionList(sessions, api.imageAddress, new Date()));
+    await (inside ? openWorkspace(decodeURIComponent(inside[1])) : openSessions());
   } catch (error) {
     if (!(error instanceof api.ApiError)) throw error;
     // Logged out: the server answers with the page that says how to log in.
     if (error.status === 401) return location.reload();
-    place.replaceChildren(failure(error.message, show));
-  } finally {
-    place.setAttribute("aria-busy", "false");
+    const { Failure } = await import("./views/failure.js");
+    render(h(Failure, { message: error.message }), PAGE);
   }
 }
 
-// Whoever comes back to the page sees what was changed elsewhere meanwhile.
-addEventListener("focus", show);
-show();
-api.health().then(
-  (health) => (version.textContent = health.version),
-  () => {}, // the list says already that the server does not answer
-);
+void open();

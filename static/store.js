@@ -164,15 +164,16 @@ export function setProblem(place, text) {
  * @property {(session: Session, name: string) => Promise<Session>} renameOf
  * @property {(session: Session) => Promise<void>} deleteSession
  * @property {(id: string) => Promise<Session>} restoreSession
- * @property {(id: string, width: number) => string} thumbnailAddress of a session
+ * @property {(id: string, index: number, width: number) => string} thumbnailAddress of a session's frame
  * @property {() => Promise<Schemas["RootJson"][]>} roots
- * @property {(root: string, path: string) => Promise<Schemas["FolderPage"]>} folders
- * @property {(source: object) => Promise<Schemas["LookAnswer"]>} lookAtRecording
+ * @property {(root: string, path: string) => Promise<Schemas["FoldersJson"]>} folders
+ * @property {(source: object) => Promise<Schemas["LookJson"]>} lookAtRecording
  * @property {(source: object, index: number, width: number) => string} lookImageAddress
- * @property {(file: File, onProgress: (sent: number, total: number) => void, signal?: AbortSignal) => Promise<Schemas["UploadAnswer"]>} upload
+ * @property {(file: File, onProgress: (sent: number, total: number) => void, signal?: AbortSignal) => Promise<Schemas["UploadJson"]>} upload
  * @property {(draft: object) => Promise<Schemas["ImportJson"]>} startImport
  * @property {(id: string) => Promise<Schemas["ImportJson"]>} importState
  * @property {(id: string) => Promise<Schemas["ImportJson"]>} cancelImport
+ * @property {() => Promise<Schemas["HealthJson"]>} health
  */
 
 /** Filled in by main.js, which knows the server. */
