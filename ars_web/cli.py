@@ -337,7 +337,7 @@ def formats(as_json: take.Json = False) -> None:
     from ars_web.recordings.registry import READERS
 
     rows = [
-        *(("import", reader.format, reader.title) for reader in READERS.values()),
+        *(("import", reader.format, f"{reader.title}: {reader.needs}") for reader in READERS.values()),
         *(("export", writer.format, writer.title) for writer in WRITERS.values()),
     ]
     if as_json:

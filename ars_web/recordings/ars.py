@@ -23,7 +23,8 @@ from ars_web.recordings.options import ReadOptions
 from ars_web.recordings.pose_checks import CheckedPoses, poses_from_quaternions
 from ars_web.recordings.recording import Recording
 
-TITLE = "ARS scene folder: images/, robot_poses.txt, camera_extrinsics.txt, camera_intrinsics.txt"
+TITLE = "ARS scene folder"
+NEEDS = "images/, robot_poses.txt, camera_extrinsics.txt, camera_intrinsics.txt"
 
 POSE_NAMES = "x y z qx qy qz qw"
 _POSES_FILE = "robot_poses.txt"

@@ -19,7 +19,8 @@ from ars_web.recordings.options import ReadOptions
 from ars_web.recordings.pose_checks import CheckedPoses
 from ars_web.recordings.recording import Frame, Recording, SkippedFrame
 
-TITLE = "COLMAP model: cameras and images (.bin or .txt), in the folder or in its sparse/0/, and the images"
+TITLE = "COLMAP model"
+NEEDS = "cameras and images (.bin or .txt), in the folder or in its sparse/0/, and the images"
 
 _IMAGE_ENDINGS = (".jpg", ".jpeg", ".png")
 

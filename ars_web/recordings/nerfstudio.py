@@ -28,7 +28,8 @@ from ars_web.recordings.options import ReadOptions
 from ars_web.recordings.pose_checks import CheckedPoses, poses_from_matrices
 from ars_web.recordings.recording import Recording
 
-TITLE = "nerfstudio: transforms.json, and the images it lists"
+TITLE = "nerfstudio"
+NEEDS = "transforms.json, and the images it lists"
 
 _ENDINGS = (".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG")
 _OPENGL_FROM_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])

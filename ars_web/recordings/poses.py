@@ -18,7 +18,8 @@ from ars_web.recordings.options import ReadOptions, real
 from ars_web.recordings.pose_checks import poses_from_matrices
 from ars_web.recordings.recording import Recording
 
-TITLE = "images and poses.txt (4 x 4 matrices), and a camera file"
+TITLE = "images with poses"
+NEEDS = "images, poses.txt (4 x 4 matrices) and a camera file"
 
 _POSES_FILE = "poses.txt"
 _WIDTHS = {16: "a 4 x 4 matrix row by row", 12: "its first three rows", 4: "one of its four rows"}

@@ -19,24 +19,26 @@ class Reader:
 
     Attributes:
         format: its key.
-        title: what it is called, and which files it needs.
+        title: what it is called.
+        needs: which files it needs.
         recognises: whether a path that exists looks like it; damage is for `read` to find.
         read: reads it, whole and sound, or raises.
     """
 
     format: str
     title: str
+    needs: str
     recognises: Callable[[Path], bool]
     read: Callable[[Path, ReadOptions], Recording]
 
 
 READERS: dict[str, Reader] = {
-    "ars": Reader("ars", ars.TITLE, ars.recognises, ars.read),
-    "roars": Reader("roars", roars.TITLE, roars.recognises, roars.read),
-    "tum": Reader("tum", tum.TITLE, tum.recognises, tum.read),
-    "colmap": Reader("colmap", colmap.TITLE, colmap.recognises, colmap.read),
-    "nerfstudio": Reader("nerfstudio", nerfstudio.TITLE, nerfstudio.recognises, nerfstudio.read),
-    "poses": Reader("poses", poses.TITLE, poses.recognises, poses.read),
+    "ars": Reader("ars", ars.TITLE, ars.NEEDS, ars.recognises, ars.read),
+    "roars": Reader("roars", roars.TITLE, roars.NEEDS, roars.recognises, roars.read),
+    "tum": Reader("tum", tum.TITLE, tum.NEEDS, tum.recognises, tum.read),
+    "colmap": Reader("colmap", colmap.TITLE, colmap.NEEDS, colmap.recognises, colmap.read),
+    "nerfstudio": Reader("nerfstudio", nerfstudio.TITLE, nerfstudio.NEEDS, nerfstudio.recognises, nerfstudio.read),
+    "poses": Reader("poses", poses.TITLE, poses.NEEDS, poses.recognises, poses.read),
 }
 
 
@@ -79,7 +81,7 @@ def _file_system_errors(path: Path) -> Generator[None]:
 def _only_format(path: Path) -> str:
     found = detect_formats(path)
     if not found:
-        known = "; ".join(f"{key}: {reader.title}" for key, reader in READERS.items())
+        known = "; ".join(f"{key}: {reader.title}, {reader.needs}" for key, reader in READERS.items())
         raise BadInput(f"{path} is no recording that is known. Known are: {known}")
     if len(found) > 1:
         raise BadInput(

@@ -30,7 +30,8 @@ from ars_web.recordings.options import ReadOptions
 from ars_web.recordings.pose_checks import poses_from_quaternions
 from ars_web.recordings.recording import RecordedBox, Recording, SkippedFrame
 
-TITLE = "ARS manifest: a .roars file, and the scene folder that it names"
+TITLE = "ARS manifest"
+NEEDS = "a .roars file, and the scene folder that it names"
 
 _NO_CLASS = -1
 

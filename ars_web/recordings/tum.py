@@ -22,7 +22,8 @@ from ars_web.recordings.options import ReadOptions, real
 from ars_web.recordings.pose_checks import CheckedPoses, poses_from_quaternions
 from ars_web.recordings.recording import Recording
 
-TITLE = "TUM: a trajectory (timestamp tx ty tz qx qy qz qw), its images and a camera file"
+TITLE = "TUM trajectory"
+NEEDS = "a trajectory (timestamp tx ty tz qx qy qz qw), its images and a camera file"
 
 MAX_TIME_APART = 0.02
 """Seconds; the benchmark's own tools take as much."""
