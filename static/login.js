@@ -12,10 +12,16 @@ form.addEventListener("submit", async (event) => {
   problem.textContent = "";
   try {
     await logIn(token.value.trim());
-    location.replace("/");
+    location.replace(destination());
   } catch (error) {
     if (!(error instanceof ApiError)) throw error;
     problem.textContent = error.message;
     token.select();
   }
 });
+
+/** Where one wanted to go: the session's page that was asked for, here or by an address whose code was used up. */
+function destination() {
+  const wanted = location.pathname === "/login" ? new URLSearchParams(location.search).get("next") : location.pathname;
+  return wanted !== null && /^\/sessions\/[a-z][a-z0-9]{11}$/.test(wanted) ? wanted : "/";
+}

@@ -11,6 +11,8 @@ from ars_web.api.credentials import COOKIE_LIFETIME, same
 from ars_web.api.dependencies import Services, ServicesDep, StrictRoute
 from ars_web.api.models import Login
 from ars_web.api.problems import ProblemResponse, documented
+from ars_web.api.security import WORKSPACE
+from ars_web.errors import NotFound
 
 
 def router(static: Path) -> APIRouter:
@@ -20,8 +22,14 @@ def router(static: Path) -> APIRouter:
     @routes.get("/", include_in_schema=False)
     def page(request: Request) -> FileResponse:
         """The page for those who are logged in, how to log in for others."""
-        known = request.scope["state"]["author"] is not None
-        return FileResponse(static / ("index.html" if known else "login.html"), headers={"Cache-Control": "no-store"})
+        return _page(static, "index.html", request)
+
+    @routes.get("/sessions/{sid}", include_in_schema=False)
+    def workspace(sid: str, request: Request) -> FileResponse:
+        """A session's page, which asks for the session itself; how to log in for others."""
+        if not WORKSPACE.fullmatch(request.scope["path"]):
+            raise NotFound(f"there is no session {sid[:40]!r}; the list of sessions is at /")
+        return _page(static, "workspace.html", request)
 
     @routes.get("/favicon.ico", include_in_schema=False)
     def icon() -> FileResponse:
@@ -29,13 +37,21 @@ def router(static: Path) -> APIRouter:
         return FileResponse(static / "icon.svg")
 
     @routes.get("/login", include_in_schema=False)
-    def by_code(request: Request, services: ServicesDep, code: Annotated[str, Query(max_length=200)] = "") -> Response:
-        """Trade a one-time code for the cookie, and go on to the page."""
-        if not services.codes.redeem(code):
+    def by_code(
+        request: Request,
+        services: ServicesDep,
+        code: Annotated[str, Query(max_length=200)] = "",
+        destination: Annotated[str, Query(alias="next")] = "/",
+    ) -> Response:
+        """Trade a one-time code for the cookie, and go on to `next`: a session's page, else the list of sessions."""
+        redeemed = services.codes.redeem(code)
+        if not redeemed and request.scope["state"]["author"] is None:
             # Static, so nothing of the request comes back as HTML.
             return FileResponse(static / "login.html", status_code=403, headers={"Cache-Control": "no-store"})
-        answer = RedirectResponse("/", status_code=303)
-        _set_cookie(answer, request, services)
+        # Nothing but a page of ours: `//host`, `/\host` and the like would lead a browser elsewhere.
+        answer = RedirectResponse(destination if WORKSPACE.fullmatch(destination) else "/", status_code=303)
+        if redeemed:
+            _set_cookie(answer, request, services)
         return answer
 
     @routes.post("/login", status_code=204, operation_id="login-create", responses=documented(413))
@@ -48,6 +64,11 @@ def router(static: Path) -> APIRouter:
         return answer
 
     return routes
+
+
+def _page(static: Path, name: str, request: Request) -> FileResponse:
+    known = request.scope["state"]["author"] is not None
+    return FileResponse(static / (name if known else "login.html"), headers={"Cache-Control": "no-store"})
 
 
 def _set_cookie(answer: Response, request: Request, services: Services) -> None:

@@ -9,6 +9,7 @@ headers   content that is not what it seems, framing, leaks by referrer, script 
 """
 
 import ipaddress
+import re
 from collections.abc import Callable, MutableMapping
 from dataclasses import dataclass
 from typing import Any
@@ -25,9 +26,14 @@ SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
 
 OPEN_PATHS = frozenset({"/", "/login", "/favicon.ico", "/api/health"})
-"""What is answered without a login; beside them only files of the page, below OPEN_FOLDER. None holds data."""
+"""What is answered without a login; beside them only the page's files, below OPEN_FOLDER, and WORKSPACE. None holds
+data."""
 
 OPEN_FOLDER = "/static/"
+
+WORKSPACE = re.compile(r"/sessions/[a-z][a-z0-9]{11}")
+"""The address of a session's page: always the same file, or how to log in. Whether there is such a session is not
+told by it."""
 
 SMALL_BODY = 64 * 1024
 """Bytes that a refused request may still send, so that its sender gets to read the answer."""
@@ -102,7 +108,7 @@ class Guard:
     """Middleware: checks what comes in, adds HEADERS to what goes out.
 
     An accepted request's `scope["state"]["author"]` names who asks: `api` for the token, `page-…` for a browser
-    that has logged in, None for nobody (only on OPEN_PATHS).
+    that has logged in, None for nobody (only where `is_open_path`).
     """
 
     def __init__(self, app: ASGIApp, *, door: Callable[[], Door]) -> None:
@@ -143,7 +149,7 @@ class Guard:
             check_origin(headers.getlist("origin"), host)
         author = who(door, headers)
         if author is None:
-            if scope["path"] in OPEN_PATHS or scope["path"].startswith(OPEN_FOLDER):
+            if is_open_path(scope["path"]):
                 return None
             raise Refused(
                 401,
@@ -156,6 +162,11 @@ class Guard:
         if author.startswith("page-"):
             check_browser(headers, unsafe=unsafe)
         return author
+
+
+def is_open_path(path: str) -> bool:
+    """Whether an address is answered without a login."""
+    return path in OPEN_PATHS or path.startswith(OPEN_FOLDER) or WORKSPACE.fullmatch(path) is not None
 
 
 def check_host(door: Door, values: list[str]) -> str:

@@ -17,6 +17,9 @@ MOST_FOLDERS = 1000
 MOST_TEXTS = 200
 """Text files that are looked into. A folder of more holds labels, or the like, and no recording."""
 
+MOST_BYTES = 64 * 2**20
+"""A larger file is not looked into: a manifest of 100,000 frames is half as large."""
+
 _IMAGES = (".jpg", ".jpeg", ".png")
 _TEXTS = (".txt", ".json", ".roars")
 _IMAGE_FOLDERS = ("images", "rgb")
@@ -92,7 +95,7 @@ def browse(folder: Path, *, within: Path) -> Browsed:
     except OSError as error:
         raise BadFile(folder, f"the folder cannot be read: {error.strerror}") from error
     texts = names.texts if len(names.texts) <= MOST_TEXTS else ()
-    files = [BrowsedFile(name, _formats(folder / name)) for name in texts]
+    files = [BrowsedFile(name, _formats_of_file(folder / name)) for name in texts]
     return Browsed(
         formats=_formats(folder) if names.may_be_recording else (),
         images=names.images,
@@ -119,6 +122,13 @@ def _formats(path: Path) -> tuple[str, ...]:
         return tuple(detect_formats(path))
     except ArsError:
         return ()  # opening or importing it says what is wrong
+
+
+def _formats_of_file(path: Path) -> tuple[str, ...]:
+    try:
+        return _formats(path) if path.stat().st_size <= MOST_BYTES else ()
+    except OSError:
+        return ()  # gone since its name was read, or a link to nothing
 
 
 def _names(folder: Path, root: Path) -> _Names:

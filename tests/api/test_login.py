@@ -1,6 +1,9 @@
 """From a one-time URL, or the token, to the page."""
 
 import httpx
+import pytest
+
+SESSION = "/sessions/abcdefghijk1"
 
 
 def test_a_one_time_url_logs_in_once(server) -> None:
@@ -70,3 +73,89 @@ def test_pages_are_files_of_the_page_and_nothing_else(client: httpx.Client) -> N
     ):
         assert client.get(httpx.URL(client.base_url, raw_path=path.encode())).status_code in (401, 404), path
     assert client.get("/static/main.js").headers["content-type"].startswith("text/javascript")
+
+
+def test_a_one_time_url_leads_to_the_session_that_it_names(server) -> None:
+    with server.stranger() as client:
+        asked = {"code": server.services.codes.issue(), "next": SESSION}
+        answer = client.get("/login", params=asked)
+        assert (answer.status_code, answer.headers["location"]) == (303, SESSION)
+        assert "set-cookie" in answer.headers
+        # Who opens it again, and is logged in by now, goes on, too.
+        again = client.get("/login", params=asked)
+        assert (again.status_code, again.headers["location"]) == (303, SESSION)
+        assert "set-cookie" not in again.headers
+    with server.stranger() as other:
+        assert other.get("/login", params=asked).status_code == 403
+
+
+@pytest.mark.parametrize(
+    "elsewhere",
+    [
+        "//evil.example",
+        "//evil.example/sessions/abcdefghijk1",
+        "/\\evil.example",
+        "\\\\evil.example",
+        "https://evil.example",
+        "https:evil.example",
+        "javascript:alert(1)",
+        "/sessions/abcdefghijk1/../../login",
+        "/sessions/abcdefghijk1\n",
+        "/sessions/abcdefghijk1\r\nLocation: https://evil.example",
+        "/sessions//evil.example",
+        "/sessions/abcdefghijk1@evil.example",
+        "/sessions/ABCDEFGHIJK1",
+        "sessions/abcdefghijk1",
+        " /sessions/abcdefghijk1",
+        "/sessions/%2e%2e/x",
+        "/api/sessions",
+        "/login?code=x",
+        "",
+        "x" * 100_000,
+    ],
+)
+def test_a_login_leads_nowhere_else(server, elsewhere: str) -> None:
+    with server.browser() as client:
+        answer = client.get("/login", params={"code": "", "next": elsewhere[:10_000]})
+        assert (answer.status_code, answer.headers["location"]) == (303, "/")
+        assert "evil" not in str(answer.headers)
+
+
+def test_a_sessions_page_is_open_as_the_list_is(server, sid: str) -> None:
+    """It holds nothing of the session, and does not say whether there is one."""
+    with server.stranger() as client:
+        there, not_there = client.get(f"/sessions/{sid}"), client.get(SESSION)
+        assert (there.status_code, there.text) == (200, client.get("/").text)
+        assert "Log in" in there.text
+        assert (not_there.status_code, not_there.text) == (200, there.text)
+        assert there.headers["cache-control"] == "no-store"
+        assert client.post(f"/sessions/{sid}").status_code == 405
+    with server.browser() as client:
+        page, list_page = client.get(f"/sessions/{sid}"), client.get("/")
+        assert page.status_code == 200
+        assert page.headers["content-type"].startswith("text/html")
+        assert "Log in" not in page.text
+        assert page.text == client.get(SESSION).text
+        assert page.text != list_page.text
+        assert "Content-Security-Policy" in page.headers
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/sessions/",
+        "/sessions/short",
+        "/sessions/abcdefghijk1/",
+        "/sessions/abcdefghijk1%0a",
+        "/sessions/abcdefghijk1/frames",
+        "/sessions/abcdefghijk1%2f..%2f..%2fapi",
+        "/sessions/%2e%2e/api",
+        "/Sessions/abcdefghijk1",
+        "/sessions/ABCDEFGHIJK1",
+    ],
+)
+def test_nothing_else_below_sessions_is_open(server, path: str) -> None:
+    with server.stranger() as client:
+        assert client.get(httpx.URL(client.base_url, raw_path=path.encode())).status_code == 401, path
+    with server.browser() as client:
+        assert client.get(httpx.URL(client.base_url, raw_path=path.encode())).status_code == 404, path
