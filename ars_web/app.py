@@ -28,19 +28,24 @@ from ars_web.api import (
     health,
     history,
     imports,
+    labels_preview,
     live,
     login,
     openapi,
+    points,
     problems,
     sessions,
+    telling_frames,
 )
 from ars_web.api.body_limit import BodyLimit
 from ars_web.api.credentials import CODE_LIFETIME, Cookies, LoginCodes, install_token
 from ars_web.api.dependencies import Services
 from ars_web.api.events import EventHub
 from ars_web.api.live_line import GOODBYE_SECONDS, LiveLines
+from ars_web.api.pictures import Pictures
 from ars_web.api.presence import Presence
 from ars_web.api.security import Door, Guard
+from ars_web.api.telling import TellingViews
 from ars_web.datasets.exports import ExportJobs
 from ars_web.errors import BadInput, StoreError
 from ars_web.sessions.editing import SessionEditor
@@ -79,7 +84,21 @@ def create_app(settings: Settings) -> FastAPI:
     )
     static = static_folder()
     problems.install(app)
-    for module in (health, folders, imports, sessions, classes, frames, boxes, history, live, exports):
+    for module in (
+        health,
+        folders,
+        imports,
+        sessions,
+        classes,
+        frames,
+        labels_preview,
+        points,
+        boxes,
+        telling_frames,
+        history,
+        live,
+        exports,
+    ):
         app.include_router(module.router)
     app.include_router(login.router(static))
     openapi.install(app)
@@ -129,6 +148,8 @@ def _lifespan(settings: Settings) -> Callable[[FastAPI], AbstractAsyncContextMan
                         codes=LoginCodes(),
                         roots=settings.roots,
                         largest_upload=settings.largest_upload,
+                        pictures=Pictures(),
+                        telling=TellingViews(store),
                     )
                     try:
                         yield

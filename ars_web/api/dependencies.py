@@ -13,9 +13,11 @@ from fastapi.routing import APIRoute
 from ars_web.api.credentials import LoginCodes
 from ars_web.api.events import EventHub
 from ars_web.api.live_line import LiveLines
+from ars_web.api.pictures import Pictures
 from ars_web.api.presence import Presence
 from ars_web.api.problems import PreconditionMissing
 from ars_web.api.security import Door
+from ars_web.api.telling import TellingViews
 from ars_web.datasets.exports import ExportJobs
 from ars_web.errors import BadInput
 from ars_web.sessions.editing import SessionEditor
@@ -55,6 +57,8 @@ class Services:
     codes: LoginCodes
     roots: Mapping[str, Path]
     largest_upload: int
+    pictures: Pictures
+    telling: TellingViews
 
 
 def _services(connection: HTTPConnection) -> Services:

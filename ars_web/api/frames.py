@@ -4,9 +4,10 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, Header, Query, Response
 
+from ars_web.api.crops import crop_from_text
 from ars_web.api.dependencies import JsonResponse, ServicesDep, StrictRoute
 from ars_web.api.models import CameraJson, FramePage, LabelJson, frames_json, label_json
-from ars_web.api.pictures import PictureRequest, picture, recorded_image
+from ars_web.api.pictures import PictureRequest, recorded_image
 from ars_web.api.problems import documented
 from ars_web.datasets.samples import frame_labels
 from ars_web.errors import NotFound
@@ -15,8 +16,9 @@ router = APIRouter(prefix="/api/sessions/{sid}", tags=["frames"], route_class=St
 
 FRAMES_AT_ONCE = 10_000
 
-IMAGE_CACHE = "private, max-age=3600"
-"""A session's images do not change; after an hour the ETag is asked about."""
+IMAGE_CACHE = "private, max-age=60, stale-while-revalidate=604800"
+"""A session's images do not change, but someone may put others in their place: for a minute nothing is asked, and after
+that a browser shows what it has at once and asks about the ETag meanwhile."""
 
 
 @router.get("/frames", operation_id="frames-list", response_model=FramePage, responses=documented(404))
@@ -55,18 +57,26 @@ def image(
     services: ServicesDep,
     width: Annotated[int | None, Query(ge=1, le=16384, description="pixels; never wider than the image is")] = None,
     rectified: Annotated[bool, Query(description="without the lens's distortion")] = False,
+    crop: Annotated[
+        str | None,
+        Query(
+            description="x0,y0,x1,y1: this part alone, in whole pixels of the original image, or of the rectified one;"
+            " `width` is then the part's"
+        ),
+    ] = None,
     if_none_match: Annotated[str | None, Header()] = None,
 ) -> Response:
-    """A frame's image: as it is stored, or a smaller or rectified JPEG of it."""
+    """A frame's image: as it is stored, or a JPEG of it that is smaller, rectified or a part."""
     table = services.store.frames(sid)
     _check(sid, index, len(table))
     camera = services.store.cameras(sid)[int(table.camera_ids[index])]
     path = recorded_image(table.images[index], own=services.store.folder / sid)
-    request = PictureRequest(path, camera, width, rectified)
+    part = None if crop is None else crop_from_text(crop, width=camera.width, height=camera.height)
+    request = PictureRequest(path, camera, width, rectified, part)
     headers = {"ETag": request.etag(), "Cache-Control": IMAGE_CACHE}
     if if_none_match is not None and headers["ETag"] in [tag.strip() for tag in if_none_match.split(",")]:
         return Response(status_code=304, headers=headers)
-    data, media_type = picture(request)
+    data, media_type = services.pictures.get(request, headers["ETag"])
     return Response(data, media_type=media_type, headers=headers)
 
 

@@ -1,13 +1,16 @@
-"""A frame's image as the page wants it: as it is stored, smaller, or rectified."""
+"""A frame's image as the page wants it: as it is stored, smaller, rectified, or a part of it."""
 
 import hashlib
+import threading
 from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 import numpy as np
+from cachetools import LRUCache, cached
 from jaxtyping import UInt8
 
+from ars_web.api.crops import Crop
 from ars_web.datasets.images import rectify
 from ars_web.errors import BadFile, NotFound, RefusedPath
 from ars_web.geometry.camera import Camera
@@ -16,14 +19,21 @@ from ars_web.recordings.images import read_image
 
 JPEG_QUALITY = 88
 
+SMALL = 400
+"""Pixels. Pictures that are asked for no wider are kept in memory: film strips show the same ones again and again."""
+
+KEPT_BYTES = 64 * 2**20
+"""Of small pictures, some ten thousand; those not looked at for longest go first."""
+
 FORM = 1
 """Part of every ETag: one more when the same request is to give other bytes than before."""
 
 _REDUCED = {
-    2: cv2.IMREAD_REDUCED_COLOR_2,
-    4: cv2.IMREAD_REDUCED_COLOR_4,
     8: cv2.IMREAD_REDUCED_COLOR_8,
+    4: cv2.IMREAD_REDUCED_COLOR_4,
+    2: cv2.IMREAD_REDUCED_COLOR_2,
 }
+"""How OpenCV decodes at an eighth, a quarter and a half of the size."""
 
 
 @dataclass(frozen=True)
@@ -35,17 +45,21 @@ class PictureRequest:
         camera: that took it.
         width: pixels; None, or more than the image has: as wide as the image.
         rectified: as the pinhole camera `geometry.camera.rectified` sees it.
+        crop: the part of the image, or of the rectified one, that is wanted; `width` is then that part's.
     """
 
     path: Path
     camera: Camera
     width: int | None
     rectified: bool
+    crop: Crop | None = None
 
     def etag(self) -> str:
         """A strong ETag: equal where the picture's bytes are."""
         status = self.path.stat()
         told = (FORM, status.st_size, status.st_mtime_ns, status.st_ino, self.camera, self.width, self.rectified)
+        if self.crop is not None:
+            told = (*told, self.crop)
         return f'"{hashlib.sha256(repr(told).encode()).hexdigest()[:24]}"'
 
 
@@ -69,25 +83,62 @@ def recorded_image(path: Path, *, own: Path) -> Path:
     return target
 
 
+class Pictures:
+    """Pictures of images; the small ones are made once, however many ask for them at once, and kept for a while."""
+
+    def __init__(self, *, kept_bytes: int = KEPT_BYTES) -> None:
+        kept: LRUCache[str, tuple[bytes, str]] = LRUCache(kept_bytes, getsizeof=_size)
+        # With a condition, who asks for what another thread is making waits for that.
+        self._small = cached(kept, key=_etag, condition=threading.Condition())(_picture)
+
+    def get(self, request: PictureRequest, etag: str) -> tuple[bytes, str]:
+        """The picture and its media type; `etag` is the request's.
+
+        Raises:
+            BadFile, TooLarge: the image cannot be used (see `recordings.images`).
+        """
+        return (self._small if request.width is not None and request.width <= SMALL else _picture)(request, etag)
+
+
+def _size(kept: tuple[bytes, str]) -> int:
+    return len(kept[0])
+
+
+def _etag(request: PictureRequest, etag: str) -> str:
+    return etag
+
+
+def _picture(request: PictureRequest, etag: str) -> tuple[bytes, str]:
+    return picture(request)
+
+
 def picture(request: PictureRequest) -> tuple[bytes, str]:
     """The picture and its media type. What is asked for as it is comes as it is, without decoding.
 
     Raises:
         BadFile, TooLarge: the image cannot be used (see `recordings.images`).
     """
-    width = request.width if request.width is not None and request.width < request.camera.width else None
+    camera, crop = request.camera, request.crop
+    part = camera.width if crop is None else crop.width
+    width = request.width if request.width is not None and request.width < part else None
     header = read_header(request.path)
-    if width is None and not request.rectified and header.orientation == 1:
+    if width is None and crop is None and not request.rectified and header.orientation == 1:
         data = request.path.read_bytes()
         return data, "image/png" if data.startswith(b"\x89PNG") else "image/jpeg"
     if not header.whole:
         raise BadFile(request.path, "the image ends before its data does (truncated)")
+    if crop is not None and (header.width, header.height) != (camera.width, camera.height):
+        raise BadFile(
+            request.path,
+            f"the image is {header.width} x {header.height} pixels, but its camera's are {camera.width} x"
+            f" {camera.height}; import the recording again",
+        )
+    factor = 1 if request.rectified or width is None else _reduction(width, header.width, crop)
+    image = read_image(request.path) if factor == 1 else _reduced(request.path, factor)
     if request.rectified:
-        image = rectify(read_image(request.path), request.camera)
-    elif width is None:
-        image = read_image(request.path)
-    else:
-        image = _reduced(request.path, stored_width=header.width, width=width)
+        image = rectify(image, camera)
+    if crop is not None:
+        image = image[crop.y0 // factor : crop.y1 // factor, crop.x0 // factor : crop.x1 // factor]
     if width is not None and width < image.shape[1]:
         height = max(1, round(image.shape[0] * width / image.shape[1]))
         image = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
@@ -95,11 +146,16 @@ def picture(request: PictureRequest) -> tuple[bytes, str]:
     return data.tobytes(), "image/jpeg"
 
 
-def _reduced(path: Path, *, stored_width: int, width: int) -> UInt8[np.ndarray, "h w 3"]:
-    """The image no smaller than `width`, decoded at a half, a quarter or an eighth where that is enough."""
-    factor = next((factor for factor in (8, 4, 2) if stored_width >= factor * width), None)
-    if factor is None:
-        return read_image(path)
+def _reduction(width: int, stored_width: int, crop: Crop | None) -> int:
+    """How much smaller the image may be decoded for a picture of a width: 8, 4, 2 or 1. A crop must not begin or end
+    within one of the smaller pixels, or the picture would be shifted by a part of one."""
+    if crop is None:
+        return next((factor for factor in _REDUCED if stored_width >= factor * width), 1)
+    return next((f for f in _REDUCED if crop.width >= f * width and crop.is_of_blocks(f)), 1)
+
+
+def _reduced(path: Path, factor: int) -> UInt8[np.ndarray, "h w 3"]:
+    """The image decoded at a half, a quarter or an eighth of its size."""
     try:
         data = np.fromfile(path, dtype=np.uint8)
         image = cv2.imdecode(data, _REDUCED[factor] | cv2.IMREAD_IGNORE_ORIENTATION)

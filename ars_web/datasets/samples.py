@@ -16,7 +16,7 @@ from ars_web.geometry import labels as geometry
 from ars_web.geometry.box import Box
 from ars_web.geometry.camera import Camera
 from ars_web.geometry.occlusion import visible_fractions
-from ars_web.sessions.model import SessionSnapshot
+from ars_web.sessions.model import FrameTable, SessionSnapshot
 
 DROP_REASONS: tuple[str, ...] = ("not_in_image", "area", "truncation", "visibility")
 """Why a box of a frame has no label, in the order in which the rules are tried; the first that applies counts."""
@@ -75,6 +75,16 @@ class FrameLabel:
     wireframe: list[Float[np.ndarray, "k 2"]]
     truncated: float
     visible: float
+
+
+@dataclass(frozen=True, eq=False)
+class PreviewLabel:
+    """A box that is not stored, in one frame; as FrameLabel has it, without what other boxes hide of it."""
+
+    bbox: tuple[float, float, float, float] | None
+    outline: Float[np.ndarray, "k 2"]
+    wireframe: list[Float[np.ndarray, "k 2"]]
+    truncated: float
 
 
 def labels_in_frames(
@@ -196,6 +206,39 @@ def frame_labels(snapshot: SessionSnapshot, index: int, *, shape: str | None = N
                 visible=float(table.visible[0, column]) if bbox else 0.0,
             )
         )
+    return found
+
+
+def preview_labels(
+    cameras: Mapping[int, Camera], frames: FrameTable, boxes: Sequence[Box], indices: Sequence[int]
+) -> list[list[PreviewLabel]]:
+    """Labels of boxes in the frames `indices`, frame by frame, those out of sight included.
+
+    Raises:
+        BadInput: there is no such frame.
+    """
+    wrong = next((index for index in indices if not 0 <= index < len(frames)), None)
+    if wrong is not None:
+        raise BadInput(f"there is no frame {wrong}; the session's frames are 0 to {len(frames) - 1}")
+    rows = list(indices)
+    camera_ids, Ts = frames.camera_ids[rows], frames.Ts_world_camera[rows]
+    table = labels_in_frames(cameras, camera_ids, Ts, boxes, with_visible=False)
+    seen = ~np.isnan(table.bbox[..., 0])
+    rings = outlines_in_frames(cameras, camera_ids, Ts, boxes, seen)
+    found: list[list[PreviewLabel]] = []
+    for row, camera_id in enumerate(camera_ids.tolist()):
+        labels: list[PreviewLabel] = []
+        for column, box in enumerate(boxes):
+            first = row * len(boxes) + column
+            labels.append(
+                PreviewLabel(
+                    bbox=_bbox_or_none(table.bbox[row, column]),
+                    outline=rings.points[rings.starts[first] : rings.starts[first + 1]],
+                    wireframe=geometry.wireframe(cameras[camera_id], Ts[row], box) if seen[row, column] else [],
+                    truncated=float(table.truncated[row, column]),
+                )
+            )
+        found.append(labels)
     return found
 
 
