@@ -29,6 +29,7 @@ import viser
 from jaxtyping import Float
 
 from ars_web.geometry.box import CORNER_SIGNS, EDGES, Box
+from ars_web.scene.hardening import is_gone
 from ars_web.scene.poses import place
 from ars_web.sessions.model import ObjectClass, SessionState, VirtualBox
 from ars_web.workspace import BoxPreview
@@ -59,7 +60,7 @@ class BoxNodes:
 
     def __init__(self, server: viser.ViserServer) -> None:
         self.lock = RLock()
-        """Held while anything of the boxes is drawn; what watches them uses it too, so that no two wait for each other."""
+        """Held while boxes are drawn. What watches them uses it too, so that no two wait for each other."""
         self._server = server
         self._nodes: dict[int, _Nodes] = {}
         self._boxes: dict[int, VirtualBox] = {}
@@ -122,6 +123,10 @@ class BoxNodes:
             stored = self._boxes.get(box_id)
             known = None if stored is None else self._classes.get(stored.class_id)
             return (255, 255, 255) if known is None else rgb(known.color)
+
+    def has_client(self, client: viser.ClientHandle) -> bool:
+        """Whether a browser is still connected; while viser tells of its end, it is not."""
+        return client.client_id in self._server.get_clients()
 
     def watch(self, changed: Watcher) -> Callable[[], None]:
         """Call `changed` with the boxes that were drawn anew. Returns the way to stop."""
@@ -203,7 +208,7 @@ class OwnBoxes:
     def show(self, *, hidden: frozenset[int], selected: int | None) -> None:
         """Hide these boxes for this view and draw one with a thicker line."""
         with self._lock:
-            if self._closed:
+            if self._closed or is_gone(self._client):
                 return
             with self._client.atomic():
                 for box_id in hidden - self._shadows.keys():
@@ -224,7 +229,7 @@ class OwnBoxes:
 
     def _changed(self, box_ids: frozenset[int]) -> None:
         with self._lock:
-            if not self._closed and self._selected in box_ids:
+            if not self._closed and self._selected in box_ids and not is_gone(self._client):
                 with self._client.atomic():
                     self._outline()
                 self._client.flush()
