@@ -1,14 +1,15 @@
 # Each of these does all its own set-up: it needs only python3 (3.11 or later), make and this checkout.
 #   make demo     the generated recording, imported, boxed and exported
 #   make test     the tests
-#   make check    format, lint, types and who may import whom
+#   make check    format, lint, types and who may import whom, of the page too
+#   make types    the page's types of the API, from its OpenAPI document
 #   make format   let ruff put the format right
 
 PYTHON ?= python3
 BIN := .venv/bin
 PINNED := pyproject.toml setup.py constraints.txt .ci/environment
 
-.PHONY: demo test check format
+.PHONY: demo test check types format
 .DELETE_ON_ERROR:
 
 demo: .venv/runtime.stamp
@@ -22,6 +23,10 @@ check: .venv/dev.stamp
 	$(BIN)/ruff check .
 	$(BIN)/pyright
 	$(BIN)/lint-imports
+	.ci/page check
+
+types: .venv/dev.stamp
+	.ci/page types
 
 format: .venv/dev.stamp
 	$(BIN)/ruff check --fix .

@@ -404,7 +404,7 @@ export interface paths {
         };
         /**
          * Image
-         * @description A frame's image: as it is stored, or a smaller or rectified JPEG of it.
+         * @description A frame's image: as it is stored, or a JPEG of it that is smaller, rectified or a part.
          */
         get: operations["frame-image-get"];
         put?: never;
@@ -427,6 +427,66 @@ export interface paths {
          * @description Every box of the session as it appears in a frame, those out of sight included.
          */
         get: operations["frame-labels-list"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/labels": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Labels Preview
+         * @description How boxes would be drawn in frames, one answer a frame in the request's order. Nothing is stored or changed.
+         */
+        post: operations["labels-preview"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/points": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Locate
+         * @description The point of the world that is seen at these places. Nothing is stored or changed.
+         */
+        post: operations["points-locate"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/frames/{index}/epipolar": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Epipolar
+         * @description The curve in this frame on which a point must be that is marked in another one, bent by the lens.
+         */
+        get: operations["frame-epipolar-get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -545,6 +605,27 @@ export interface paths {
          * @description Move a box that is at the revision in `If-Match` up or down until its lowest corner is at z = 0.
          */
         post: operations["boxes-to-ground"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/boxes/{box_id}/telling-frames": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Telling Frames
+         * @description The frames that together show every kind of error of a box best, from different sides, in the recording's order;
+         *     fewer than `count` where fewer show it. Boxes that hide it are not looked at.
+         */
+        get: operations["telling-frames-list"];
+        put?: never;
+        post?: never;
         delete?: never;
         options?: never;
         head?: never;
@@ -1118,6 +1199,20 @@ export interface components {
             summary: string;
         };
         /**
+         * EpipolarAnswer
+         * @description Where in the frame the point must be.
+         */
+        EpipolarAnswer: {
+            /**
+             * Lines
+             * @description polylines in the original image, away from the other frame's camera; none: the frame does not show where the point can be
+             */
+            lines: [
+                number,
+                number
+            ][][];
+        };
+        /**
          * ExportDraft
          * @description An export to start.
          */
@@ -1382,6 +1477,16 @@ export interface components {
             total: number;
         };
         /**
+         * FramePreviewJson
+         * @description The boxes in one frame, in the request's order.
+         */
+        FramePreviewJson: {
+            /** Frame */
+            frame: number;
+            /** Labels */
+            labels: components["schemas"]["PreviewLabelJson"][];
+        };
+        /**
          * HealthJson
          * @description That the server is up.
          */
@@ -1560,6 +1665,16 @@ export interface components {
             visible: number;
         };
         /**
+         * LabelsPreviewDraft
+         * @description Boxes, and the frames to see them in.
+         */
+        LabelsPreviewDraft: {
+            /** Boxes */
+            boxes: components["schemas"]["PreviewBoxJson"][];
+            /** Frames */
+            frames: number[];
+        };
+        /**
          * Login
          * @description The token, to be traded for a cookie.
          */
@@ -1729,6 +1844,18 @@ export interface components {
             first: components["schemas"]["SkippedFrameJson"][];
         };
         /**
+         * ObservationJson
+         * @description Where the point is seen in a frame; image coordinates of the original image.
+         */
+        ObservationJson: {
+            /** Frame */
+            frame: number;
+            /** X */
+            x: number;
+            /** Y */
+            y: number;
+        };
+        /**
          * PastEdit
          * @description One entry of the session's history, as it stands now.
          */
@@ -1808,6 +1935,44 @@ export interface components {
             own: boolean;
         };
         /**
+         * PointAnswer
+         * @description Where the point is, and how well the observations agree.
+         */
+        PointAnswer: {
+            /**
+             * Point
+             * @description in the world, metres
+             */
+            point: [
+                number,
+                number,
+                number
+            ];
+            /**
+             * Residuals Px
+             * @description how far from each observation the point is seen, pixels
+             */
+            residuals_px: number[];
+            /**
+             * Angle Degrees
+             * @description the largest between two of the rays; small: the distance is uncertain
+             */
+            angle_degrees: number;
+            /**
+             * Warnings
+             * @description what is uncertain, and what to do about it, for the user
+             */
+            warnings: string[];
+        };
+        /**
+         * PointDraft
+         * @description A point as it is seen in two frames or more.
+         */
+        PointDraft: {
+            /** Observations */
+            observations: components["schemas"]["ObservationJson"][];
+        };
+        /**
          * PointsDraft
          * @description A box to add from four points along three consecutive edges.
          */
@@ -1832,6 +1997,60 @@ export interface components {
             frame?: number | null;
             /** Name */
             name?: string | null;
+        };
+        /**
+         * PreviewBoxJson
+         * @description A box as it would be.
+         */
+        PreviewBoxJson: {
+            /** @description the box's centre and axes in the world */
+            T_world_box: components["schemas"]["TransformJson"];
+            /**
+             * Size
+             * @description metres along the box's own axes
+             */
+            size: [
+                number,
+                number,
+                number
+            ];
+        };
+        /**
+         * PreviewLabelJson
+         * @description One box in one frame; image coordinates of the original image, to a hundredth of a pixel.
+         */
+        PreviewLabelJson: {
+            /**
+             * Bbox
+             * @description x0 y0 x1 y1 of the part in the image; null: no part is in it
+             */
+            bbox: [
+                number,
+                number,
+                number,
+                number
+            ] | null;
+            /**
+             * Outline
+             * @description ring round the part in the image, not closed
+             */
+            outline: [
+                number,
+                number
+            ][];
+            /**
+             * Wireframe
+             * @description the edges within the image, bent by the lens
+             */
+            wireframe: [
+                number,
+                number
+            ][][];
+            /**
+             * Truncated
+             * @description share of the amodal outline's area outside the image
+             */
+            truncated: number;
         };
         /**
          * RectifiedCamera
@@ -2023,6 +2242,29 @@ export interface components {
             classes: {
                 [key: string]: number;
             };
+        };
+        /**
+         * TellingFrameJson
+         * @description A frame in which errors of the box show.
+         */
+        TellingFrameJson: {
+            /** Frame */
+            frame: number;
+            /**
+             * Px Per Mm
+             * @description pixels that a corner is drawn off for 1 mm that it is off, at most
+             */
+            px_per_mm: number;
+            /**
+             * Crop
+             * @description x0 y0 x1 y1 of the part of the original image with the box in it; for the image's `crop`
+             */
+            crop: [
+                number,
+                number,
+                number,
+                number
+            ];
         };
         /**
          * TransformAnswer
@@ -4785,6 +5027,8 @@ export interface operations {
                 width?: number | null;
                 /** @description without the lens's distortion */
                 rectified?: boolean;
+                /** @description x0,y0,x1,y1: this part alone, in whole pixels of the original image, or of the rectified one; `width` is then the part's */
+                crop?: string | null;
             };
             header?: {
                 "if-none-match"?: string | null;
@@ -4910,6 +5154,301 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["LabelJson"][];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "labels-preview": {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description a repeat with the same key answers what the first answered, and does nothing */
+                "idempotency-key"?: string | null;
+            };
+            path: {
+                sid: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["LabelsPreviewDraft"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["FramePreviewJson"][];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description beyond a limit, which the detail names */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "points-locate": {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description a repeat with the same key answers what the first answered, and does nothing */
+                "idempotency-key"?: string | null;
+            };
+            path: {
+                sid: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["PointDraft"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PointAnswer"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description beyond a limit, which the detail names */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "frame-epipolar-get": {
+        parameters: {
+            query: {
+                /** @description the frame in which the point is marked */
+                of: number;
+                /** @description image coordinate in the original image */
+                x: number;
+                /** @description image coordinate in the original image */
+                y: number;
+            };
+            header?: never;
+            path: {
+                sid: string;
+                index: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["EpipolarAnswer"];
                 };
             };
             /** @description no token, a wrong one, or a cookie that has ended */
@@ -5791,6 +6330,94 @@ export interface operations {
                 };
                 content: {
                     "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "telling-frames-list": {
+        parameters: {
+            query?: {
+                count?: number;
+            };
+            header?: never;
+            path: {
+                sid: string;
+                box_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TellingFrameJson"][];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
                 };
             };
             /** @description a fault of the server, logged there under the number in the detail */

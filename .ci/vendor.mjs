@@ -1,11 +1,14 @@
-// Copies the page's libraries out of node_modules, as `npm run vendor`. Changes nothing in them but the names of
-// modules: an import map would need an inline script, which the page's content security policy forbids.
-import { copyFileSync, mkdirSync, readFileSync, writeFileSync } from "node:fs";
+// Copies the page's libraries out of node_modules into static/vendor/: `npm run vendor`. With --check it copies nothing
+// and fails where something differs. Changes nothing in them but the names of modules: an import map would need an inline
+// script, which the page's content security policy forbids.
+import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
 
-const here = dirname(fileURLToPath(import.meta.url));
-const modules = join(here, "..", "..", "node_modules");
+const top = join(dirname(fileURLToPath(import.meta.url)), "..");
+const here = join(top, "static", "vendor");
+const modules = join(top, "node_modules");
+const checking = process.argv.includes("--check");
 
 /** Each icon that the page uses, by Lucide's name. */
 const ICONS = [
@@ -52,8 +55,7 @@ for (const [from, to] of SCRIPTS) {
   put(to, source.replace(/(from\s*)"([^".][^"]*)"/g, (_, word, name) => `${word}"${address(name)}"`));
 }
 for (const [from, to] of FILES) {
-  mkdirSync(dirname(join(here, to)), { recursive: true });
-  copyFileSync(join(modules, from), join(here, to));
+  put(to, readFileSync(join(modules, from)));
 }
 
 const nodes = JSON.parse(readFileSync(join(modules, "lucide-static/icon-nodes.json"), "utf8"));
@@ -76,10 +78,15 @@ function address(name) {
   return ADDRESSES[/** @type {keyof ADDRESSES} */ (name)] ?? fail(name);
 }
 
-/** @param {string} to @param {string} text */
-function put(to, text) {
-  mkdirSync(dirname(join(here, to)), { recursive: true });
-  writeFileSync(join(here, to), text);
+/** @param {string} to @param {string | Buffer} content */
+function put(to, content) {
+  const path = join(here, to);
+  if (checking) {
+    if (readFileSync(path).equals(Buffer.from(content))) return;
+    throw new Error(`${path} is not what the packages hold: run \`npm run vendor\``);
+  }
+  mkdirSync(dirname(path), { recursive: true });
+  writeFileSync(path, content);
 }
 
 /** @param {string} name @returns {never} */
