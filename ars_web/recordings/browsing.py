@@ -147,13 +147,20 @@ def _names(folder: Path, root: Path) -> _Names:
                 images += 1
             elif entry.is_symlink() and not real(Path(entry.path)).is_relative_to(root):
                 continue
-            elif entry.is_dir():
+            elif _is_folder(entry):
                 folders.append(name)
             elif ending in _TEXTS:
                 texts.append(name)
             else:
                 others += 1
     return _Names(tuple(sorted(folders)), tuple(sorted(texts)), images, others)
+
+
+def _is_folder(entry: os.DirEntry[str]) -> bool:
+    try:
+        return entry.is_dir()
+    except OSError:
+        return False  # links that run in a ring
 
 
 def _is_text(name: str) -> bool:

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ars_web.errors import BadFile, BadInput, RefusedPath
+from ars_web.errors import BadFile, BadInput, Cancelled, RefusedPath
 from ars_web.recordings.registry import READERS, ReadOptions, detect_formats, read_recording
 
 
@@ -189,3 +189,39 @@ def test_what_the_file_system_refuses_is_named(tmp_path: Path) -> None:
 def test_a_nul_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RefusedPath, match="has a NUL in it"):
         read_recording(tmp_path / "a\0b")
+
+
+def test_every_form_tells_how_far_it_is(written, form: str) -> None:
+    told: list[tuple[int, int]] = []
+    read_recording(written(form), options=ReadOptions(progress=lambda done, total: told.append((done, total))))
+    assert told == [(done, 6) for done in range(1, 7)]
+
+
+def test_what_progress_raises_stops_the_reading(written, form: str) -> None:
+    told: list[int] = []
+
+    def stop(done: int, total: int) -> None:
+        told.append(done)
+        if done == 3:
+            raise Cancelled("enough")
+
+    with pytest.raises(Cancelled):
+        read_recording(written(form), options=ReadOptions(progress=stop))
+    assert told == [1, 2, 3]
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("/data/root/scene/poses.txt:3: is not a number", "scene/poses.txt:3: is not a number"),
+        ("/data/root: is missing", "the folder: is missing"),
+        ("/data/root/x leads outside /data/root, and nothing", "x leads outside the folder, and nothing"),
+        ("it could be in /data/root.", "it could be in the folder."),
+        ("('/data/root/x')", "('x')"),
+        ("/data/rooted/x and /mnt/data/root/x and /data/root.old/x", None),
+        ("/data/other", None),
+    ],
+)
+def test_paths_are_told_from_where_one_may_look(text: str, told: str | None) -> None:
+    assert ReadOptions(within=Path("/data/root")).told(text) == (text if told is None else told)
+    assert ReadOptions().told(text) == text
