@@ -1302,31 +1302,31 @@ export interface components {
             frames: components["schemas"]["FrameChoice"];
             /**
              * Images
-             * @description hard links (copies across file systems), copies, undistorted copies, or no images
+             * @description how the dataset gets its images
              * @default link
              * @enum {string}
              */
             images: "link" | "copy" | "rectify" | "none";
             /**
-             * Shape
-             * @description default: the hull where a box has one, else the box
+             * Label shape
+             * @description what labels are drawn round; default: the hull where a box has one, else the box
              */
             shape?: ("box" | "hull" | "mesh") | null;
             /**
-             * Min Visible
-             * @description labels with a smaller visible fraction are dropped
+             * Smallest visible share
+             * @description labels of objects that nearer boxes hide more than this leaves are dropped; 0 keeps all
              * @default 0
              */
             min_visible: number;
             /**
-             * Max Truncated
-             * @description labels with a larger share outside the image are dropped
+             * Largest share outside
+             * @description labels of objects that are outside the image by more than this are dropped; 1 keeps all
              * @default 1
              */
             max_truncated: number;
             /**
-             * Min Area Px
-             * @description labels with a smaller in-image box are dropped
+             * Smallest area
+             * @description labels whose box in the image is smaller than so many pixels are dropped
              * @default 4
              */
             min_area_px: number;
@@ -1341,8 +1341,8 @@ export interface components {
              */
             split: components["schemas"]["SplitChoice"];
             /**
-             * Sessions
-             * @description ids of further sessions to merge; classes are matched by name
+             * Merge with
+             * @description ids of further sessions in the same dataset; classes are matched by name
              * @default []
              */
             sessions: string[];
@@ -1431,18 +1431,26 @@ export interface components {
          */
         FrameChoice: {
             /**
-             * Step
+             * Every N-th frame
+             * @description neighbouring frames look alike: with 5, every fifth is written
              * @default 1
              */
             step: number;
             /**
-             * Start
+             * First frame
+             * @description frames before this one are left out; they count from 0
              * @default 0
              */
             start: number;
-            /** Stop */
+            /**
+             * Up to frame
+             * @description this frame and those after it are left out; empty: to the end
+             */
             stop?: number | null;
-            /** List */
+            /**
+             * These frames alone
+             * @description numbers of frames, instead of the three options above
+             */
             list?: number[] | null;
         };
         /**
@@ -2201,28 +2209,33 @@ export interface components {
          */
         SplitChoice: {
             /**
-             * Train
+             * Training
+             * @description share of the frames to train on; the three add up to 1
              * @default 0.8
              */
             train: number;
             /**
-             * Val
+             * Validation
+             * @description share of the frames to tune on while training
              * @default 0.2
              */
             val: number;
             /**
              * Test
+             * @description share of the frames kept for a last, honest measurement
              * @default 0
              */
             test: number;
             /**
-             * By
+             * Divide by
+             * @description what goes to one side or the other as a whole
              * @default block
              * @enum {string}
              */
             by: "block" | "frame" | "session";
             /**
              * Seed
+             * @description another number divides the frames another way
              * @default 0
              */
             seed: number;

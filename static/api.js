@@ -159,11 +159,11 @@ export const frameLabels = (sid, index) => request("GET", under(sid, `/frames/${
  * @param {string} sid
  * @param {{T_world_box: object, size: number[]}[]} boxes
  * @param {number[]} frames
- * @returns {Promise<Schemas["FramePreview"][]>}
+ * @returns {Promise<Schemas["FramePreviewJson"][]>}
  */
 export const labelsOf = (sid, boxes, frames) => request("POST", under(sid, "/labels"), { body: { boxes, frames } });
 
-/** @param {string} sid @param {number} id @returns {Promise<Schemas["TellingFrame"][]>} */
+/** @param {string} sid @param {number} id @returns {Promise<Schemas["TellingFrameJson"][]>} */
 export const tellingFrames = (sid, id) => request("GET", under(sid, `/boxes/${id}/telling-frames?count=6`));
 
 /** @param {string} sid @param {{frame: number, x: number, y: number}[]} observations @returns {Promise<Schemas["PointAnswer"]>} */

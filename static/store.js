@@ -126,7 +126,7 @@ export function setProblem(place, text) {
  * @property {(classId: number, points: [number, number, number][]) => Promise<number>} boxFromPoints
  *   through four corners in the world; answers the angle in degrees by which the edges were set right
  * @property {(observations: {frame: number, x: number, y: number}[]) => Promise<Schemas["PointAnswer"]>} locatePoint
- * @property {(of: {frame: number, x: number, y: number}, frame: number) => Promise<[number, number][][]>} epipolar
+ * @property {(of: {frame: number, x: number, y: number}, frame: number) => Promise<Schemas["EpipolarAnswer"]>} epipolar
  *   where a point seen in one frame may be in another: polylines in image coordinates
  * @property {(name: string) => Promise<ObjectClass>} addClass
  * @property {(id: number, changes: {name?: string, color?: string, default_size?: [number, number, number] | null}) => Promise<void>} changeClass
@@ -142,8 +142,8 @@ export function setProblem(place, text) {
  * @property {() => void} leaveFrame
  * @property {(at: "all" | "selected" | "frame") => void} look
  * @property {(id: number | null) => void} select
- * @property {(id: number) => Promise<Schemas["TellingFrame"][]>} tellingFrames
- * @property {(boxes: {T_world_box: Transform, size: [number, number, number]}[], frames: number[]) => Promise<Schemas["FramePreview"][]>} labelsOf
+ * @property {(id: number) => Promise<Schemas["TellingFrameJson"][]>} tellingFrames
+ * @property {(boxes: {T_world_box: Transform, size: [number, number, number]}[], frames: number[]) => Promise<Schemas["FramePreviewJson"][]>} labelsOf
  * @property {(index: number) => Promise<Schemas["LabelJson"][]>} frameLabels
  * @property {(index: number, options?: {width?: number, crop?: [number, number, number, number]}) => string} imageAddress
  * @property {(index: number) => Promise<string>} imageProblem why a frame's image cannot be shown, in words
