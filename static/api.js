@@ -171,7 +171,7 @@ export const locatePoint = (sid, observations) => request("POST", under(sid, "/p
 
 /**
  * @param {string} sid @param {{frame: number, x: number, y: number}} of @param {number} frame
- * @returns {Promise<[number, number][][]>}
+ * @returns {Promise<Schemas["EpipolarAnswer"]>}
  */
 export const epipolar = (sid, of, frame) =>
   request("GET", under(sid, `/frames/${frame}/epipolar?${query({ of: of.frame, x: of.x, y: of.y })}`));

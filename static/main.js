@@ -27,7 +27,7 @@ Object.assign(
     newBox: (classId) => line.send({ type: "new-box", class_id: classId }),
     boxFromPoints: editing.boxFromPoints,
     locatePoint: (observations) => api.locatePoint(sid(), observations),
-    epipolar: (of, frame) => api.epipolar(sid(), of, frame),
+    epipolar: async (of, frame) => (await api.epipolar(sid(), of, frame)).lines,
     addClass: editing.addClass,
     changeClass: editing.changeClass,
     deleteClass: editing.deleteClass,

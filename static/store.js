@@ -126,7 +126,7 @@ export function setProblem(place, text) {
  * @property {(classId: number, points: [number, number, number][]) => Promise<number>} boxFromPoints
  *   through four corners in the world; answers the angle in degrees by which the edges were set right
  * @property {(observations: {frame: number, x: number, y: number}[]) => Promise<Schemas["PointAnswer"]>} locatePoint
- * @property {(of: {frame: number, x: number, y: number}, frame: number) => Promise<Schemas["EpipolarAnswer"]>} epipolar
+ * @property {(of: {frame: number, x: number, y: number}, frame: number) => Promise<[number, number][][]>} epipolar
  *   where a point seen in one frame may be in another: polylines in image coordinates
  * @property {(name: string) => Promise<ObjectClass>} addClass
  * @property {(id: number, changes: {name?: string, color?: string, default_size?: [number, number, number] | null}) => Promise<void>} changeClass
