@@ -40,6 +40,7 @@ async def live(websocket: WebSocket, sid: str, services: ServicesDep, author: Au
         events=services.events,
         presence=services.presence,
         scene=services.scene,
+        patience_seconds=services.lines.patience_seconds,
     )
     await services.lines.run(line, websocket, after=address.after)
 

@@ -44,9 +44,6 @@ logger = logging.getLogger(__name__)
 LARGEST_MESSAGE = 256 * 1024
 """Characters of a message from a page."""
 
-PATIENCE_SECONDS = 20.0
-"""How long a page may leave what was sent to it unread."""
-
 GOODBYE_SECONDS = 1.0
 """How long a page that reads nothing may hold up the end of its line."""
 
@@ -94,7 +91,7 @@ class LiveLine:
         events: EventHub,
         presence: Presence,
         scene: SceneViews,
-        patience_seconds: float = PATIENCE_SECONDS,
+        patience_seconds: float,
     ) -> None:
         self.sid = sid
         self.view = person.view
@@ -209,9 +206,14 @@ class LiveLine:
 
 
 class LiveLines:
-    """The lines of all sessions. Used on the event loop's thread alone."""
+    """The lines of all sessions. Used on the event loop's thread alone.
 
-    def __init__(self) -> None:
+    Attributes:
+        patience_seconds: how long a page may leave what was sent to it unread.
+    """
+
+    def __init__(self, *, patience_seconds: float = 20.0) -> None:
+        self.patience_seconds = patience_seconds
         self._lines: dict[tuple[str, str], LiveLine] = {}
         self._open = 0
         self._changed = asyncio.Condition()

@@ -99,6 +99,7 @@ class Refused(Exception):
 
     def __init__(self, status: int, kind: str, title: str, detail: str, **headers: str) -> None:
         super().__init__(detail)
+        self.title = title
         self.response = ProblemResponse(
             status, kind, title, detail, headers={k.replace("_", "-"): v for k, v in headers.items()}
         )
@@ -122,7 +123,7 @@ class Guard:
             return
 
         async def send_guarded(message: Message) -> None:
-            if message["type"] == "http.response.start":
+            if message["type"] in ("http.response.start", "websocket.http.response.start"):
                 _add_headers(message, scope["path"])
             await send(message)
 
@@ -130,8 +131,8 @@ class Guard:
             state: MutableMapping[str, Any] = scope.setdefault("state", {})
             state["author"] = self._check(scope)
         except Refused as refused:
-            if scope["type"] == "websocket":
-                await send({"type": "websocket.close", "code": 1008, "reason": str(refused)})
+            if scope["type"] == "websocket" and "websocket.http.response" not in scope.get("extensions", {}):
+                await send({"type": "websocket.close", "code": 1008, "reason": refused.title})
                 return
             if _sends_much(Headers(scope=scope)):
                 # Otherwise the server would go on reading what it throws away, for as long as the stranger sends.
@@ -148,8 +149,9 @@ class Guard:
         if unsafe:
             check_origin(headers.getlist("origin"), host)
         author = who(door, headers)
+        is_open = is_open_path(scope["path"])
         if author is None:
-            if is_open_path(scope["path"]):
+            if is_open and scope["type"] == "http":
                 return None
             raise Refused(
                 401,
@@ -161,6 +163,9 @@ class Guard:
             )
         if author.startswith("page-"):
             check_browser(headers, unsafe=unsafe)
+        if is_open and scope["type"] == "websocket":
+            # What serves files would fail on it.
+            raise Refused(404, "not-found", "Not found", "there is no websocket at this address")
         return author
 
 

@@ -1,12 +1,14 @@
 """A real server on a free port of this machine, in a thread, with a small recording to import."""
 
+import importlib.util
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
+from types import MappingProxyType, ModuleType
 from typing import Any
 
 import cv2
@@ -135,6 +137,18 @@ def _run_server() -> Callable[..., AbstractContextManager[Server]]:
 @pytest.fixture(name="write_scene")
 def _write_scene() -> Callable[..., Path]:
     return write_scene
+
+
+@pytest.fixture(scope="session")
+def live_page() -> ModuleType:
+    """`live_page.py`, a page's end of the live line."""
+    spec = importlib.util.spec_from_file_location("live_page", Path(__file__).parent / "live_page.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
 
 
 @pytest.fixture

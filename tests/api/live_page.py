@@ -39,14 +39,18 @@ class Page:
         return people
 
 
+def address(url: str, sid: str, view: str, *, after: int | None = None) -> str:
+    """Where a page finds its line."""
+    return f"{url.replace('http', 'ws', 1)}/api/sessions/{sid}/live?view={view}" + (
+        "" if after is None else f"&after={after}"
+    )
+
+
 @contextmanager
-def line(
-    url: str, sid: str, view: str, *, after: int | str | None = None, query: str = "", **headers: str
-) -> Iterator[Page]:
+def line(url: str, sid: str, view: str, *, after: int | None = None, query: str = "", **headers: str) -> Iterator[Page]:
     """A live line; headers are the test's to choose."""
-    address = f"{url.replace('http', 'ws', 1)}/api/sessions/{sid}/live?view={view}"
-    address += "" if after is None else f"&after={after}"
-    with connect(address + query, additional_headers=headers, proxy=None, compression=None) as connection:
+    where = address(url, sid, view, after=after) + query
+    with connect(where, additional_headers=headers, proxy=None, close_timeout=1) as connection:
         yield Page(connection)
 
 

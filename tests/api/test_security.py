@@ -209,16 +209,20 @@ def test_a_host_that_is_missing_double_or_odd_is_refused(values: list[str]) -> N
 
 
 @pytest.mark.parametrize(
-    ("headers", "passes"),
+    ("path", "headers", "passes"),
     [
-        ({"host": "localhost:1", "authorization": "Bearer t"}, True),
-        ({"host": "localhost:1", "authorization": "Bearer t", "origin": "http://localhost:1"}, True),
-        ({"host": "localhost:1", "authorization": "Bearer t", "origin": "http://localhost:2"}, False),
-        ({"host": "evil.example", "authorization": "Bearer t"}, False),
-        ({"host": "localhost:1"}, False),
+        ("/scene/s/", {"host": "localhost:1", "authorization": "Bearer t"}, True),
+        ("/scene/s/", {"host": "localhost:1", "authorization": "Bearer t", "origin": "http://localhost:1"}, True),
+        ("/scene/s/", {"host": "localhost:1", "authorization": "Bearer t", "origin": "http://localhost:2"}, False),
+        ("/scene/s/", {"host": "evil.example", "authorization": "Bearer t"}, False),
+        ("/scene/s/", {"host": "localhost:1"}, False),
+        # Open to requests, which is no reason to open a line there.
+        ("/static/main.js", {"host": "localhost:1"}, False),
+        ("/static/main.js", {"host": "localhost:1", "authorization": "Bearer t"}, False),
+        ("/", {"host": "localhost:1"}, False),
     ],
 )
-def test_websockets_are_guarded_alike(headers: dict[str, str], passes: bool) -> None:
+def test_websockets_are_guarded_alike(path: str, headers: dict[str, str], passes: bool) -> None:
     reached: list[str] = []
     sent: list[dict[str, Any]] = []
 
@@ -233,7 +237,7 @@ def test_websockets_are_guarded_alike(headers: dict[str, str], passes: bool) -> 
 
     scope = {
         "type": "websocket",
-        "path": "/scene/s/",
+        "path": path,
         "headers": [(k.encode(), v.encode()) for k, v in headers.items()],
     }
     guard = Guard(app, door=lambda: Door("t", Cookies("t"), "cookie", host="127.0.0.1"))
