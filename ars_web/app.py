@@ -23,6 +23,7 @@ from ars_web.api import (
     boxes,
     classes,
     exports,
+    formats,
     folders,
     frames,
     health,
@@ -34,6 +35,7 @@ from ars_web.api import (
     openapi,
     points,
     problems,
+    scene_door,
     sessions,
     telling_frames,
 )
@@ -48,13 +50,13 @@ from ars_web.api.security import Door, Guard
 from ars_web.api.telling import TellingViews
 from ars_web.datasets.exports import ExportJobs
 from ars_web.errors import BadInput, StoreError
+from ars_web.scene.server import SceneServers
 from ars_web.sessions.editing import SessionEditor
 from ars_web.sessions.import_jobs import ImportJobs
 from ars_web.sessions.import_looks import ImportLooks
 from ars_web.sessions.store import SessionStore
 from ars_web.sessions.uploads import Uploads
 from ars_web.settings import Settings
-from ars_web.workspace import BoxPreview, ViewAction, ViewEvent, ViewState
 
 SHUTDOWN_SECONDS = 5
 """How long a server that is stopped waits for answers that are being sent."""
@@ -97,7 +99,9 @@ def create_app(settings: Settings) -> FastAPI:
         telling_frames,
         history,
         live,
+        scene_door,
         exports,
+        formats,
     ):
         app.include_router(module.router)
     app.include_router(login.router(static))
@@ -125,7 +129,7 @@ def _lifespan(settings: Settings) -> Callable[[FastAPI], AbstractAsyncContextMan
                 uploads.sweep()
                 jobs.resume_unfinished()
                 editor = SessionEditor(store)
-                async with EventHub(store).running() as hub:
+                async with EventHub(store).running() as hub, _closing(SceneServers(store, editor)) as scenes:
                     unlisten = editor.listen(hub.wake)
                     app.state.services = Services(
                         store=store,
@@ -137,7 +141,8 @@ def _lifespan(settings: Settings) -> Callable[[FastAPI], AbstractAsyncContextMan
                         events=hub,
                         lines=LiveLines(),
                         presence=Presence(),
-                        scene=_Unseen(),
+                        scene=scenes,
+                        scene_pages=scenes,
                         door=Door(
                             token=token,
                             cookies=Cookies(token),
@@ -160,6 +165,14 @@ def _lifespan(settings: Settings) -> Callable[[FastAPI], AbstractAsyncContextMan
                 await run_in_threadpool(jobs.close)
 
     return lifespan
+
+
+@asynccontextmanager
+async def _closing(scenes: SceneServers) -> AsyncGenerator[SceneServers]:
+    try:
+        yield scenes
+    finally:
+        await run_in_threadpool(scenes.close)
 
 
 def sessions_token(settings: Settings) -> str:
@@ -243,22 +256,9 @@ def serve(settings: Settings, *, on_ready: Callable[[str], None] | None = None) 
         finally:
             # Whoever interrupts a second time does not wait for the lifespan's end; an export must not keep it up.
             if hasattr(app.state, "services"):
+                app.state.services.scene_pages.close()
                 app.state.services.imports.close()
                 app.state.services.exports.close()
-
-
-class _Unseen:
-    """The scene as long as there is none to join here."""
-
-    def attach(self, sid: str, view: str, *, author: str, send: Callable[[ViewEvent], None]) -> None: ...
-
-    def detach(self, sid: str, view: str) -> None: ...
-
-    def show(self, sid: str, view: str, state: ViewState) -> None: ...
-
-    def act(self, sid: str, view: str, action: ViewAction) -> None: ...
-
-    def preview(self, sid: str, view: str, preview: BoxPreview | None) -> None: ...
 
 
 class _Server(uvicorn.Server):

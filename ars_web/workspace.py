@@ -5,7 +5,7 @@ a click or a drag, comes back as a `ViewEvent`; the page decides what follows fr
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
 from ars_web.geometry.box import Box
@@ -148,4 +148,56 @@ class SceneViews(Protocol):
 
     def preview(self, sid: str, view: str, preview: BoxPreview | None) -> None:
         """Show a box as it is being typed, to all views of the session; None: no more."""
+        ...
+
+
+@dataclass(frozen=True)
+class ScenePage:
+    """The page that a scene's iframe shows, the same for all scenes.
+
+    Attributes:
+        body: HTML, compressed by gzip.
+        etag: changes when the page does.
+        content_security_policy: what the page needs, and no more.
+    """
+
+    body: bytes
+    etag: str
+    content_security_policy: str
+
+
+@dataclass(frozen=True)
+class SceneAddress:
+    """Where one view of a session's scene is served, for the proxy alone.
+
+    Attributes:
+        url: a websocket on loopback.
+        headers: what proves that the proxy asks, and says for whom.
+    """
+
+    url: str
+    headers: dict[str, str] = field(repr=False)
+
+
+class ScenePages(Protocol):
+    """The scene, as the proxy in front of it uses it. Both may take a while, and belong on a worker thread."""
+
+    def page(self) -> ScenePage:
+        """The scene's page."""
+        ...
+
+    def address(self, sid: str, *, view: str, author: str) -> SceneAddress:
+        """Where the session's scene is served; it is opened if it is not open.
+
+        Args:
+            view: the page's name for its view; empty: a browser that only looks.
+            author: of the edits made in the scene.
+
+        Raises:
+            NotFound: there is no such session.
+        """
+        ...
+
+    def close(self) -> None:
+        """Close all scenes; may be called twice."""
         ...

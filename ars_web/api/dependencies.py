@@ -25,7 +25,7 @@ from ars_web.sessions.import_jobs import ImportJobs
 from ars_web.sessions.import_looks import ImportLooks
 from ars_web.sessions.store import SessionStore
 from ars_web.sessions.uploads import Uploads
-from ars_web.workspace import SceneViews
+from ars_web.workspace import ScenePages, SceneViews
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,7 @@ class Services:
         lines: the live lines that are open.
         presence: who is at which session.
         scene: what the live lines show their pages.
+        scene_pages: where those scenes are served, for the proxy in front of them.
         door: who is let in.
         codes: one-time login codes.
         roots: folders that clients may import recordings from, links resolved, by name.
@@ -53,6 +54,7 @@ class Services:
     lines: LiveLines
     presence: Presence
     scene: SceneViews
+    scene_pages: ScenePages
     door: Door
     codes: LoginCodes
     roots: Mapping[str, Path]

@@ -1,0 +1,124 @@
+"""How large a recording is, and where a person would stand to see it.
+
+World coordinates, metres, z up.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+SAMPLES = 2000
+"""How many of the frames are looked at."""
+
+FIELD_OF_VIEW = math.radians(50)
+"""Vertical, of the free camera."""
+
+ELEVATION = math.radians(32)
+ASIDE = math.radians(38)
+"""The free camera starts above the recorded cameras' side of the objects, and this far round from it, so that the
+path is seen from the side."""
+
+
+@dataclass(frozen=True, eq=False)
+class Extent:
+    """The size of a recording.
+
+    Attributes:
+        focus: (3,) what the cameras look at, or their middle where they do not look at one place.
+        radius: of the sphere round `focus` that holds nearly all cameras.
+        ground: z of the ground's plane.
+        towards_cameras: azimuth of the cameras as seen from the focus, about z.
+        frustum_depth: how deep a camera's frustum is drawn.
+    """
+
+    focus: Float[np.ndarray, "3"]
+    radius: float
+    ground: float
+    towards_cameras: float
+    frustum_depth: float
+
+
+@dataclass(frozen=True, eq=False)
+class Viewpoint:
+    """Where the free camera stands and what it looks at, (3,) each, in the world."""
+
+    position: Float[np.ndarray, "3"]
+    look_at: Float[np.ndarray, "3"]
+
+
+def recording_extent(Ts_world_camera: Float[np.ndarray, "n 4 4"]) -> Extent:
+    """The extent of a recording of at least one frame."""
+    step = max(1, len(Ts_world_camera) // SAMPLES)
+    Ts = Ts_world_camera[::step]
+    centres, forwards = Ts[:, :3, 3], Ts[:, :3, 2]
+    middle = np.median(centres, axis=0)
+    spread = float(np.percentile(np.linalg.norm(centres - middle, axis=1), 95))
+    focus = _common_focus(centres, forwards, spread)
+    if focus is None:
+        ahead = forwards.mean(axis=0)
+        focus = middle + ahead * (0.5 * spread if spread > 0 else 1.0)
+    radius = max(float(np.percentile(np.linalg.norm(centres - focus, axis=1), 95)), 1e-3)
+    lowest = float(Ts_world_camera[:, 2, 3].min())
+    outwards = centres.mean(axis=0)[:2] - focus[:2]
+    return Extent(
+        focus=focus,
+        radius=radius,
+        ground=min(0.0, lowest),
+        towards_cameras=math.atan2(outwards[1], outwards[0]) if np.hypot(*outwards) > 0.05 * radius else -math.pi / 2,
+        frustum_depth=0.08 * radius,
+    )
+
+
+def _common_focus(
+    centres: Float[np.ndarray, "n 3"], forwards: Float[np.ndarray, "n 3"], spread: float
+) -> Float[np.ndarray, "3"] | None:
+    """The point nearest to all optical axes in the least-squares sense, where most cameras do look at it.
+
+    It solves sum (I - f f^T) (p - c) = 0.
+    """
+    across = np.eye(3) - forwards[:, :, None] * forwards[:, None, :]
+    normal = across.mean(axis=0)
+    if np.linalg.eigvalsh(normal)[0] < 0.01:  # the axes are nearly parallel
+        return None
+    point = np.linalg.solve(normal, np.einsum("nij,nj->i", across, centres) / len(centres))
+    ahead = np.einsum("ni,ni->n", point - centres, forwards)
+    distance = np.linalg.norm(point - centres, axis=1)
+    looked_at = (ahead > 0.8 * distance) & (distance < 10 * max(spread, 1e-3))
+    return point if looked_at.mean() > 0.7 else None
+
+
+def overview(extent: Extent, corners_world: Float[np.ndarray, "n 3"]) -> Viewpoint:
+    """A three-quarter view of the whole recording with its boxes, n corners, which may be none."""
+    return _three_quarter(extent, np.array(extent.focus), _reach(extent, corners_world))
+
+
+def _reach(extent: Extent, corners_world: Float[np.ndarray, "n 3"]) -> float:
+    if not len(corners_world):
+        return extent.radius
+    farthest = float(np.linalg.norm(corners_world - extent.focus, axis=1).max())
+    # A box that someone put far away by mistake must not make everything else a dot.
+    return max(extent.radius, min(farthest, 3 * extent.radius))
+
+
+def close_up(extent: Extent, corners_world: Float[np.ndarray, "n 3"]) -> Viewpoint:
+    """A three-quarter view of one thing with its surroundings."""
+    middle = corners_world.mean(axis=0)
+    return _three_quarter(extent, middle, 2.0 * float(np.linalg.norm(corners_world - middle, axis=1).max()))
+
+
+def behind_camera(extent: Extent, T_world_camera: Float[np.ndarray, "4 4"]) -> Viewpoint:
+    """A view over the shoulder of a camera, at its frustum and what it looks at."""
+    centre, (right, down, forward) = T_world_camera[:3, 3], T_world_camera[:3, :3].T
+    back = centre - 5.0 * extent.frustum_depth * forward - 2.2 * extent.frustum_depth * down
+    position = back + 1.4 * extent.frustum_depth * right
+    return Viewpoint(position=position, look_at=centre + 2.0 * extent.frustum_depth * forward)
+
+
+def _three_quarter(extent: Extent, target: Float[np.ndarray, "3"], reach: float) -> Viewpoint:
+    azimuth = extent.towards_cameras + ASIDE
+    outwards = np.array(
+        [math.cos(ELEVATION) * math.cos(azimuth), math.cos(ELEVATION) * math.sin(azimuth), math.sin(ELEVATION)]
+    )
+    return Viewpoint(position=target + 1.05 * reach / math.sin(FIELD_OF_VIEW / 2) * outwards, look_at=target)
