@@ -83,6 +83,8 @@ export const zoom = signal(1);
 /** What lies over everything: the key list, the palette, the contact sheet. */
 export const overlay = signal(/** @type {"help" | "palette" | "contact-sheet" | null} */ (null));
 export const sidePanel = signal(/** @type {"boxes" | "history"} */ ("boxes"));
+/** The class that new boxes get, once somebody chose one; see `classOfNew`. */
+export const chosenClass = signal(/** @type {number | null} */ (null));
 /** How far "jump" goes. */
 export const jump = signal(10);
 export const theme = signal(/** @type {"dark" | "light"} */ ("dark"));
@@ -98,6 +100,12 @@ export const shownBoxes = computed(() => {
 export const selectedBox = computed(() =>
   selected.value === null ? null : (shownBoxes.value.get(selected.value) ?? null),
 );
+
+/** The class that a new box gets: the one chosen last, else that of the selected box, else the first; null: there is none. */
+export const classOfNew = computed(() => {
+  const known = [chosenClass.value, selectedBox.value?.class_id].find((id) => classes.value.has(id ?? -1));
+  return known ?? [...classes.value.keys()][0] ?? null;
+});
 
 /** @param {string} place @param {string | null} text null: nothing is wrong there any more */
 export function setProblem(place, text) {
