@@ -178,28 +178,33 @@ def _words(kind: str, message: str, place: tuple[int | str, ...], context: Mappi
 _TYPES = "hello, view, look, new-box, preview"
 
 
-class ReadyMessage(BaseModel):
+class _ToPage(BaseModel):
+    # What is generated from the schema can tell the messages apart only by a `type` that is never absent.
+    model_config = ConfigDict(json_schema_serialization_defaults_required=True)
+
+
+class ReadyMessage(_ToPage):
     """The line is up; `edit` messages of what the page has missed follow."""
 
     type: Literal["ready"] = "ready"
     revision: int = Field(description="the session's")
 
 
-class ResetMessage(BaseModel):
+class ResetMessage(_ToPage):
     """The page has seen revisions that the session does not have: it must read everything anew."""
 
     type: Literal["reset"] = "reset"
     revision: int = Field(description="the session's")
 
 
-class EditMessage(BaseModel):
+class EditMessage(_ToPage):
     """An edit was made, by whomever."""
 
     type: Literal["edit"] = "edit"
     edit: EditJson
 
 
-class GoneMessage(BaseModel):
+class GoneMessage(_ToPage):
     """The session was deleted; the line is closed."""
 
     type: Literal["gone"] = "gone"
@@ -218,14 +223,14 @@ class PersonJson(BaseModel):
     own: bool = Field(description="whether it is the page that this is told to")
 
 
-class HereMessage(BaseModel):
+class HereMessage(_ToPage):
     """Who is at the session: all of them, whenever that changes, and again where a line would be silent for long."""
 
     type: Literal["here"] = "here"
     people: list[PersonJson]
 
 
-class PickedMessage(BaseModel):
+class PickedMessage(_ToPage):
     """Something was clicked in the scene: a box, a frame's camera, or (both null) nothing."""
 
     type: Literal["picked"] = "picked"
@@ -233,7 +238,7 @@ class PickedMessage(BaseModel):
     frame: int | None
 
 
-class EnteredMessage(BaseModel):
+class EnteredMessage(_ToPage):
     """The scene has been told all of a frame."""
 
     type: Literal["entered"] = "entered"
@@ -241,7 +246,7 @@ class EnteredMessage(BaseModel):
     milliseconds: float = Field(description="since it was asked")
 
 
-class DraggedMessage(BaseModel):
+class DraggedMessage(_ToPage):
     """A box is being dragged, in this view or another. A slow page gets only the newest of each box."""
 
     type: Literal["dragged"] = "dragged"
@@ -266,7 +271,7 @@ class PlacedJson(BaseModel):
         return cls.model_validate(_placed(preview))
 
 
-class ConflictedMessage(BaseModel):
+class ConflictedMessage(_ToPage):
     """A drag could not be stored, since the box was changed meanwhile."""
 
     type: Literal["conflicted"] = "conflicted"
@@ -275,7 +280,7 @@ class ConflictedMessage(BaseModel):
     current: BoxAnswer | None = Field(description="as it is now; null: deleted")
 
 
-class RefusedMessage(BaseModel):
+class RefusedMessage(_ToPage):
     """A message, or what it asked for, could not be done; the line stays open."""
 
     type: Literal["refused"] = "refused"

@@ -126,3 +126,30 @@ def test_answers_fit_their_schemas(
     made = client.post(f"/api/sessions/{sid}/boxes", json=box_json).json()
     schema = document["components"]["schemas"]["BoxAnswer"]
     assert set(made) == set(schema["properties"]) == set(schema["required"])
+
+
+def test_the_live_line_s_messages_are_in_it(document: dict[str, Any]) -> None:
+    schemas = document["components"]["schemas"]
+    for name, types in {
+        "LiveFromPage": {"hello", "view", "look", "new-box", "preview"},
+        "LiveToPage": {
+            "ready",
+            "reset",
+            "edit",
+            "gone",
+            "here",
+            "picked",
+            "entered",
+            "dragged",
+            "conflicted",
+            "refused",
+        },
+    }.items():
+        union = schemas[name]
+        assert union["discriminator"]["propertyName"] == "type"
+        assert set(union["discriminator"]["mapping"]) == types
+        for member in union["oneOf"]:
+            message = schemas[member["$ref"].rpartition("/")[2]]
+            assert message["properties"]["type"]["const"] in types
+            assert "type" in message["required"]
+            assert name == "LiveToPage" or message["additionalProperties"] is False
