@@ -15,7 +15,7 @@ const USUAL = 4 / 3;
 export function BottomBar({ marks }) {
   const shown = useSignal(/** @type {{first: number, last: number} | null} */ (null));
   const aspect = useAspect();
-  return html`<footer class="bottom-bar" aria-label="Frames">
+  return html`<footer class="frames-bar" aria-label="Frames">
     <${Scrubber} marks=${marks} shown=${shown} aspect=${aspect} />
     <${FilmStrip} shown=${shown} aspect=${aspect} />
   </footer>`;
