@@ -1,14 +1,18 @@
 """`/api/exports`: training sets in the making, and their download."""
 
+import asyncio
 from collections.abc import Iterator
+from threading import Event
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Request, Response
 from fastapi.responses import StreamingResponse
+from starlette.concurrency import run_in_threadpool
 
 from ars_web.api.dependencies import IdempotencyKey, ServicesDep, StrictRoute
 from ars_web.api.models import ExportDraft, ExportJson
 from ars_web.api.problems import documented
 from ars_web.api.zip_stream import zip_stream
+from ars_web.datasets.forecast import Forecast
 from ars_web.errors import Conflict
 
 router = APIRouter(tags=["exports"], route_class=StrictRoute)
@@ -32,6 +36,36 @@ def create(sid: str, draft: ExportDraft, response: Response, services: ServicesD
     job = services.exports.start(sid, format=draft.format, options=draft.options, key=key)
     response.headers["Location"] = f"/api/exports/{job.id}"
     return ExportJson.of(job)
+
+
+@router.post(
+    "/api/sessions/{sid}/exports/preview",
+    operation_id="exports-preview",
+    responses=documented(404, 409, 413),
+)
+async def preview(
+    sid: str, draft: ExportDraft, request: Request, services: ServicesDep, key: IdempotencyKey
+) -> Forecast:
+    """What an export would write of the session as it is now: the counts that its report then has.
+
+    Nothing is written, so a repeat is harmless. Long sessions take seconds; who hangs up stops the work.
+    """
+    left = Event()
+    watch = asyncio.create_task(_when_left(request, left))
+    try:
+        return await run_in_threadpool(
+            services.exports.forecast, sid, format=draft.format, options=draft.options, cancelled=left.is_set
+        )
+    finally:
+        watch.cancel()
+
+
+@router.delete(
+    "/api/exports/{export_id}", status_code=204, operation_id="exports-delete", responses=documented(404, 409)
+)
+def delete(export_id: str, services: ServicesDep) -> None:
+    """Delete an export that has ended, and its dataset. It cannot change any more, so no `If-Match` is needed."""
+    services.exports.delete(export_id)
 
 
 @router.get("/api/exports/{export_id}", operation_id="exports-get", responses=documented(404))
@@ -68,3 +102,10 @@ def download(export_id: str, services: ServicesDep) -> StreamingResponse:
         media_type="application/zip",
         headers={"Content-Disposition": f'attachment; filename="{name}.zip"'},
     )
+
+
+async def _when_left(request: Request, left: Event) -> None:
+    """Set `left` once the client is gone. The request's body has been read: what comes now is its end."""
+    while (await request.receive())["type"] != "http.disconnect":
+        pass
+    left.set()

@@ -350,6 +350,8 @@ class ExportJson(BaseModel):
         description="once done: counts by class and split, dropped labels by reason"
     )
     created: datetime
+    ended: datetime | None = Field(description="when it was done, failed or cancelled; null until then")
+    bytes: int | None = Field(description="of all files of a done dataset, linked images too: what a download holds")
 
     @classmethod
     def of(cls, job: ExportJob) -> "ExportJson":

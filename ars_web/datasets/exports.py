@@ -11,7 +11,7 @@ import secrets
 import shutil
 import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -21,13 +21,14 @@ from typing import Any, Literal
 from pydantic import TypeAdapter, ValidationError
 
 from ars_web.datasets.assembly import DOCUMENT
+from ars_web.datasets.forecast import Forecast, forecast
 from ars_web.datasets.jobs import partial_folder, run_export
 from ars_web.datasets.options import ExportOptions
 from ars_web.datasets.plan import ExportPlan, check_merged, plan_export
 from ars_web.datasets.plan_files import read_digest, read_plan
 from ars_web.datasets.registry import writer_of
 from ars_web.datasets.samples import check_shape
-from ars_web.errors import ArsError, BadInput, Cancelled, NotFound, StoreError
+from ars_web.errors import ArsError, BadInput, Cancelled, Conflict, NotFound, StoreError
 from ars_web.sessions.model import SessionSnapshot
 
 _log = logging.getLogger(__name__)
@@ -45,7 +46,8 @@ class ExportJob:
         error: one clear line, of a failed job.
         report: what `dataset.json` says, of a done job.
         key: the Idempotency-Key it was asked for with.
-        created: UTC.
+        created, ended: UTC; ended is None until the job is done, failed or cancelled.
+        bytes: of all files of a done job's dataset, linked images included.
     """
 
     id: str
@@ -59,9 +61,19 @@ class ExportJob:
     report: dict[str, Any] | None
     key: str | None
     created: datetime
+    # Jobs from before these were kept do not say.
+    ended: datetime | None = None
+    bytes: int | None = None
 
 
 _JSON = TypeAdapter(ExportJob)
+
+
+_DELETED = ".deleted"
+"""What follows a deleted job's id in the name of its folder, until that is gone."""
+
+_STOPPING_SECONDS = 5.0
+"""How long the deletion of a job waits for workers that were told to stop."""
 
 
 class _Closing(Exception):
@@ -89,6 +101,8 @@ class ExportJobs:
         self._runner = ThreadPoolExecutor(max_workers=1, thread_name_prefix="export")
         self._futures: dict[str, Future[None]] = {}
         self._jobs: dict[str, ExportJob] = {}
+        for remains in self._folder.glob(f"*{_DELETED}"):
+            shutil.rmtree(remains, ignore_errors=True)
         for path in sorted(self._folder.glob("*/job.json")):
             try:
                 job = _JSON.validate_json(path.read_bytes())
@@ -172,10 +186,58 @@ class ExportJobs:
                 raise NotFound(f"there is no export {job_id!r}")
             job = self._jobs[job_id]
             if job.state in ("queued", "running"):
-                job = replace(job, state="cancelled")
+                job = replace(job, state="cancelled", ended=datetime.now(UTC))
                 self._jobs[job_id] = job
                 self._keep(job)
             return job
+
+    def delete(self, job_id: str) -> None:
+        """Remove a job that has ended, and its dataset.
+
+        Raises:
+            NotFound: there is no such job, or no more.
+            Conflict: it is queued or running, or its workers do not stop.
+            StoreError: its folder cannot be removed.
+        """
+        job = self.get(job_id)
+        if job.state in ("queued", "running"):
+            raise Conflict(f"export {job_id} is {job.state}; cancel it before it can be deleted")
+        future = self._futures.get(job_id)
+        # One that was cancelled while it waited has no work to stop; another may need a moment.
+        if future is not None and not future.cancel() and not wait([future], timeout=_STOPPING_SECONDS).done:
+            raise Conflict(f"export {job_id} is still being stopped; try again in a moment")
+        folder = self._folder / job_id
+        remains = folder.with_name(f"{job_id}{_DELETED}")
+        with self._lock:
+            if self._jobs.pop(job_id, None) is None:
+                raise NotFound(f"there is no export {job_id!r}")
+            self._futures.pop(job_id, None)
+            try:
+                # Gone by one step: a server that ends meanwhile leaves no half job, and the next one tidies up.
+                folder.rename(remains)
+            except OSError as error:
+                self._jobs[job_id] = job
+                raise StoreError(f"{folder}: the export cannot be deleted: {error.strerror}") from error
+        try:
+            shutil.rmtree(remains)
+        except OSError as error:
+            raise StoreError(f"{error.filename or remains}: cannot be deleted: {error.strerror}") from error
+
+    def forecast(
+        self,
+        sid: str,
+        *,
+        format: str,  # noqa: A002 - the contract's name
+        options: ExportOptions,
+        cancelled: Callable[[], bool] | None = None,
+    ) -> Forecast:
+        """What an export would write of a session as it is now; raises as `start` does, and as the job would.
+
+        Raises:
+            Cancelled: `cancelled`, asked a few times a second, answered yes, or the server is going down.
+        """
+        plan = plan_export(self._snapshots(sid, options), format=format, options=options, out=self._folder / "forecast")
+        return forecast(plan, cancelled=lambda: self._closing.is_set() or (cancelled is not None and cancelled()))
 
     def resume_unfinished(self) -> None:
         """Go on with the jobs that a server left queued or running when it ended."""
@@ -220,7 +282,7 @@ class ExportJobs:
                     cancelled=lambda: self._stopped(job_id),
                 )
                 report = self._finished_report(job_id)
-            self._change(job_id, state="done", report=report)
+            self._change(job_id, state="done", report=report, bytes=_bytes_below(self._out(job_id)))
         except _Closing:
             return
         except Cancelled:
@@ -270,6 +332,8 @@ class ExportJobs:
             job = self._jobs[job_id]
             if job.state == "cancelled":
                 return False
+            if changes["state"] != "running":
+                changes["ended"] = datetime.now(UTC)
             if changes["state"] == "done":
                 changes["done"] = changes["total"] = sum(s["images"] for s in changes["report"]["splits"].values())
             # In memory first: a full disk must not hide that the job failed.
@@ -299,3 +363,12 @@ class ExportJobs:
         for folder in (self._out(job_id), partial_folder(self._out(job_id))):
             with suppress(FileNotFoundError):
                 shutil.rmtree(folder)
+
+
+def _bytes_below(folder: Path) -> int:
+    """The bytes of all files below a folder."""
+    total = 0
+    with os.scandir(folder) as entries:
+        for entry in entries:
+            total += _bytes_below(Path(entry)) if entry.is_dir() else entry.stat().st_size
+    return total

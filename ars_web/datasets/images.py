@@ -10,6 +10,7 @@ import shutil
 import stat
 from functools import lru_cache
 from pathlib import Path
+from typing import Literal
 
 import cv2
 import numpy as np
@@ -62,14 +63,21 @@ def place_image(source: str, target: str, *, camera: Camera, stamp: tuple[int, i
             f"the image is {header.width} x {header.height} pixels, but its camera's are"
             f" {camera.width} x {camera.height}; labels would not fit it",
         )
-    if images == "rectify" and camera.model != "pinhole":
-        _encode(rectify(read_image(Path(source)), camera), target)
-    elif header.orientation != 1 or not _same_encoding(source, target):
-        _encode(read_image(Path(source)), target)
-    elif images == "link":
+    how = "encoded" if header.orientation != 1 else placement(source, target, camera=camera, images=images)
+    if how == "encoded":
+        image = read_image(Path(source))
+        _encode(rectify(image, camera) if images == "rectify" and camera.model != "pinhole" else image, target)
+    elif how == "linked":
         _link(source, target)
     else:
         shutil.copyfile(source, target)
+
+
+def placement(source: str, target: str, *, camera: Camera, images: str) -> Literal["linked", "copied", "encoded"]:
+    """How `place_image` makes `target`, where the image's Exif asks for no turning and links can be made."""
+    if (images == "rectify" and camera.model != "pinhole") or not _same_encoding(source, target):
+        return "encoded"
+    return "linked" if images == "link" else "copied"
 
 
 def rectify(image: UInt8[np.ndarray, "h w 3"], camera: Camera) -> UInt8[np.ndarray, "h w 3"]:

@@ -1,6 +1,9 @@
-"""The options of an export, as the API takes them, the command line spells them and `dataset.json` keeps them."""
+"""The options of an export, as the API takes them, the command line spells them and `dataset.json` keeps them.
 
-from typing import Annotated, Literal
+Titles and descriptions are for people who export: the page shows them, through `option_list.py`.
+"""
+
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -13,13 +16,28 @@ class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+def _meanings(**choices: str) -> dict[str, Any]:
+    """What each choice of a field means, for its JSON schema."""
+    return {"x-meanings": choices}
+
+
 class FrameChoice(_Strict):
     """Which frames of each session: every `step`-th from `start` up to, not including, `stop`; or those listed."""
 
-    step: int = Field(1, strict=True, ge=1)
-    start: Count = 0
-    stop: Count | None = None
-    list: tuple[Count, ...] | None = None
+    step: int = Field(
+        1,
+        strict=True,
+        ge=1,
+        title="Every N-th frame",
+        description="neighbouring frames look alike: with 5, every fifth is written",
+    )
+    start: Count = Field(0, title="First frame", description="frames before this one are left out; they count from 0")
+    stop: Count | None = Field(
+        None, title="Up to frame", description="this frame and those after it are left out; empty: to the end"
+    )
+    list: tuple[Count, ...] | None = Field(
+        None, title="These frames alone", description="numbers of frames, instead of the three options above"
+    )
 
     @model_validator(mode="after")
     def _one_of_the_two(self) -> "FrameChoice":
@@ -35,11 +53,20 @@ class SplitChoice(_Strict):
     `session`: whole sessions. Shares must add up to 1.
     """
 
-    train: Share = 0.8
-    val: Share = 0.2
-    test: Share = 0.0
-    by: Literal["block", "frame", "session"] = "block"
-    seed: Count = 0
+    train: Share = Field(0.8, title="Training", description="share of the frames to train on; the three add up to 1")
+    val: Share = Field(0.2, title="Validation", description="share of the frames to tune on while training")
+    test: Share = Field(0.0, title="Test", description="share of the frames kept for a last, honest measurement")
+    by: Literal["block", "frame", "session"] = Field(
+        "block",
+        title="Divide by",
+        description="what goes to one side or the other as a whole",
+        json_schema_extra=_meanings(
+            block="runs of neighbouring frames, so that validation frames have no twin in training",
+            frame="single frames at random: nearly every validation frame then has a twin in training",
+            session="whole sessions, where several are merged",
+        ),
+    )
+    seed: Count = Field(0, title="Seed", description="another number divides the frames another way")
 
     @model_validator(mode="after")
     def _shares_add_up(self) -> "SplitChoice":
@@ -58,15 +85,44 @@ class ExportOptions(_Strict):
     frames: FrameChoice = FrameChoice()  # pyright: ignore[reportCallIssue]
     images: Literal["link", "copy", "rectify", "none"] = Field(
         "link",
-        description="hard links (copies across file systems), copies, undistorted copies, or no images",
+        title="Images",
+        description="how the dataset gets its images",
+        json_schema_extra=_meanings(
+            link="the same files under a second name, which takes no room (copies on another disk)",
+            copy="copies, so that nothing done to the recording later changes the dataset",
+            rectify="copies without the lens's distortion, with labels to match; slow",
+            none="no images, only labels",
+        ),
     )
     shape: Literal["box", "hull", "mesh"] | None = Field(
-        None, description="default: the hull where a box has one, else the box"
+        None,
+        title="Label shape",
+        description="what labels are drawn round; default: the hull where a box has one, else the box",
+        json_schema_extra=_meanings(
+            box="the virtual box", hull="the visual hull of the object's masks", mesh="the class's mesh"
+        ),
     )
-    min_visible: Share = Field(0.0, description="labels with a smaller visible fraction are dropped")
-    max_truncated: Share = Field(1.0, description="labels with a larger share outside the image are dropped")
+    min_visible: Share = Field(
+        0.0,
+        title="Smallest visible share",
+        description="labels of which less than this is visible, nearer boxes hiding the rest, are dropped; 0 keeps all",
+    )
+    max_truncated: Share = Field(
+        1.0,
+        title="Largest share outside",
+        description="labels of which more than this lies outside the image are dropped; 1 keeps all",
+    )
     min_area_px: float = Field(
-        4.0, strict=True, ge=0.0, allow_inf_nan=False, description="labels with a smaller in-image box are dropped"
+        4.0,
+        strict=True,
+        ge=0.0,
+        allow_inf_nan=False,
+        title="Smallest area",
+        description="labels whose box in the image is smaller than so many pixels are dropped",
     )
     split: SplitChoice = SplitChoice()  # pyright: ignore[reportCallIssue]
-    sessions: tuple[str, ...] = Field((), description="ids of further sessions to merge; classes are matched by name")
+    sessions: tuple[str, ...] = Field(
+        (),
+        title="Merge with",
+        description="ids of further sessions in the same dataset; classes are matched by name",
+    )

@@ -18,6 +18,9 @@ from ars_web.geometry.camera import Camera
 from ars_web.geometry.occlusion import visible_fractions
 from ars_web.sessions.model import FrameTable, SessionSnapshot
 
+SHAPES: tuple[str, ...] = ("box",)
+"""What labels are drawn round today. No box has a stored hull yet, so `hull` falls back to the box."""
+
 DROP_REASONS: tuple[str, ...] = ("not_in_image", "area", "truncation", "visibility")
 """Why a box of a frame has no label, in the order in which the rules are tried; the first that applies counts."""
 

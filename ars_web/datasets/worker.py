@@ -13,17 +13,17 @@ from tempfile import mkdtemp
 import numpy as np
 from jaxtyping import Int
 
+from ars_web.datasets.counting import select_labels, split_counts
 from ars_web.datasets.file_names import safe
 from ars_web.datasets.images import image_name, place_image
 from ars_web.datasets.plan import ExportPlan
 from ars_web.datasets.plan_files import read_plan
 from ars_web.datasets.registry import writer_of
-from ars_web.datasets.report import ShardReport, SplitCounts
-from ars_web.datasets.samples import Outlines, kept, labels_in_frames, outlines_in_frames
+from ars_web.datasets.report import ShardReport
+from ars_web.datasets.samples import Outlines, outlines_in_frames
 from ars_web.datasets.splits import SPLITS
 from ars_web.datasets.writers.writer import Shard
 from ars_web.errors import Cancelled
-from ars_web.geometry.camera import rectified
 
 CANCEL = "cancel"
 """A file of this name in the partial folder asks the workers to stop."""
@@ -92,7 +92,8 @@ def export_shard(partial: str, number: int, digest: str) -> int:
     if plan.options.images != "none":
         _place_images(plan, number, shard, tmp / "files", check)
     digests = writer_of(plan.format).write(shard, tmp / "files", tmp / "fragments")
-    report = ShardReport(splits=_counts(shard), dropped=dropped, digests=digests)
+    counts = split_counts(shard.splits, shard.keep, shard.class_of_box.tolist(), shard.class_names)
+    report = ShardReport(splits=counts, dropped=dropped, digests=digests)
     (tmp / "shard.json").write_text(report.model_dump_json(), encoding="utf-8")
     check()
     whole = shard_folder(folder, number)
@@ -128,12 +129,9 @@ def _shard(plan: ExportPlan, number: int) -> tuple[Shard, dict[str, int]]:
     start, stop = plan.shards[number]
     frames, writer = plan.frames, writer_of(plan.format)
     session = plan.sessions[int(frames.session[start])]
-    rectify = plan.options.images == "rectify"
-    cameras = {i: rectified(c) if rectify else c for i, c in session.cameras.items()}
+    selection = select_labels(plan, start, stop, with_visible=writer.with_visible)
+    cameras, keep = selection.cameras, selection.keep
     camera_ids, Ts = frames.camera_id[start:stop], frames.Ts_world_camera[start:stop]
-    with_visible = writer.with_visible or plan.options.min_visible > 0
-    table = labels_in_frames(cameras, camera_ids, Ts, session.boxes, with_visible=with_visible)
-    keep, dropped = kept(table, plan.options)
     wanted = keep if writer.with_outlines else np.zeros_like(keep)
     outlines: Outlines = outlines_in_frames(cameras, camera_ids, Ts, session.boxes, wanted)
     sizes: Int[np.ndarray, "n 2"] = np.array(
@@ -154,11 +152,11 @@ def _shard(plan: ExportPlan, number: int) -> tuple[Shard, dict[str, int]]:
             class_names=plan.class_names,
             class_of_box=np.array(session.class_of_box, dtype=np.int64),
             most_boxes=max(len(s.boxes) for s in plan.sessions),
-            table=table,
+            table=selection.table,
             keep=keep,
             outlines=outlines,
         ),
-        dropped,
+        selection.dropped,
     )
 
 
@@ -189,19 +187,3 @@ def _place_images(plan: ExportPlan, number: int, shard: Shard, files: Path, chec
             stamp=stamp,
             images=plan.options.images,
         )
-
-
-def _counts(shard: Shard) -> dict[str, SplitCounts]:
-    found: dict[str, SplitCounts] = {}
-    of_frame = np.array(shard.splits)
-    for split in sorted(set(shard.splits)):
-        keep = shard.keep[of_frame == split]
-        per_box = keep.sum(axis=0)
-        per_class = np.bincount(shard.class_of_box, weights=per_box, minlength=len(shard.class_names))
-        found[split] = SplitCounts(
-            images=len(keep),
-            negatives=int((~keep.any(axis=1)).sum()),
-            labels=int(keep.sum()),
-            classes=dict(zip(shard.class_names, per_class.astype(int).tolist(), strict=True)),
-        )
-    return found

@@ -1,5 +1,6 @@
 """Export jobs: asked for, followed, cancelled, failed, and gone on with by the next server."""
 
+import json
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -13,7 +14,7 @@ import pytest
 from ars_web.datasets.exports import ExportJobs
 from ars_web.datasets.jobs import partial_folder, plan_export, run_export
 from ars_web.datasets.options import ExportOptions
-from ars_web.errors import BadInput, NotFound, StoreError
+from ars_web.errors import BadInput, Cancelled, Conflict, NotFound, StoreError
 from ars_web.sessions.model import SessionSnapshot
 
 Make = Callable[..., SessionSnapshot]
@@ -76,6 +77,10 @@ def test_a_job_runs_to_its_dataset(make_snapshot: Make, tree: Tree, tmp_path: Pa
         assert (job.session_id, job.state, job.error, job.report) == ("s1", "queued", None, None)
         done = jobs.wait(job.id, timeout=60)
         assert (done.state, done.done, done.total) == ("done", 12, 12)
+        assert job.ended is None
+        assert done.created <= done.ended
+        files = [path for path in jobs.dataset_folder(job.id).rglob("*") if path.is_file()]
+        assert done.bytes == sum(path.stat().st_size for path in files) > 0
         assert done.report["format"] == "coco"
         run_export(plan_export([snapshot], format="coco", options=PLAIN, out=tmp_path / "d"))
         assert tree(jobs.dataset_folder(job.id)) == tree(tmp_path / "d")
@@ -207,7 +212,8 @@ def test_a_job_whose_server_died_after_publishing_is_done(make_snapshot: Make, t
     path.write_text(path.read_text().replace('"state":"done"', '"state":"running"'))
     with jobs_of(tmp_path / "sessions", snapshot) as jobs:
         jobs.resume_unfinished()
-        assert jobs.wait(job.id, timeout=60) == job
+        again = jobs.wait(job.id, timeout=60)
+        assert replace(again, ended=job.ended) == job
 
 
 def test_a_key_answers_its_job_when_the_session_is_gone(make_snapshot: Make, tmp_path: Path) -> None:
@@ -238,3 +244,83 @@ def test_a_job_that_cannot_be_kept_is_not_made(make_snapshot: Make, tmp_path: Pa
         with pytest.raises(StoreError, match="the export cannot be kept"):
             jobs.start("s1", format="yolo", options=PLAIN)
         assert jobs.list() == []
+
+
+def test_a_job_of_a_program_that_kept_no_sizes_is_there(make_snapshot: Make, tmp_path: Path) -> None:
+    folder = tmp_path / "sessions"
+    with jobs_of(folder, make_snapshot(2)) as jobs:
+        job = jobs.wait(jobs.start("s1", format="yolo", options=PLAIN).id, timeout=60)
+    path = folder / ".exports" / job.id / "job.json"
+    kept = json.loads(path.read_bytes())
+    del kept["ended"], kept["bytes"]
+    path.write_text(json.dumps(kept))
+    with jobs_of(folder) as jobs:
+        assert jobs.get(job.id) == replace(job, ended=None, bytes=None)
+
+
+def test_an_export_that_has_ended_can_be_deleted(make_snapshot: Make, tmp_path: Path) -> None:
+    folder = tmp_path / "sessions"
+    with jobs_of(folder, make_snapshot(4)) as jobs:
+        job, other = (jobs.start("s1", format=kind, options=PLAIN) for kind in ("yolo", "coco"))
+        jobs.wait(other.id, timeout=60)
+        jobs.delete(job.id)
+        assert [job.id for job in jobs.list()] == [other.id]
+        assert [path.name for path in (folder / ".exports").iterdir()] == [other.id]
+        for gone in (job.id, "x0"):
+            with pytest.raises(NotFound, match=gone):
+                jobs.delete(gone)
+    with jobs_of(folder) as jobs:
+        assert [job.id for job in jobs.list()] == [other.id]
+
+
+def test_an_export_that_runs_or_waits_is_deleted_once_it_is_cancelled(make_snapshot: Make, tmp_path: Path) -> None:
+    gate = Gate()
+    folder = tmp_path / "sessions"
+    with jobs_of(folder, make_snapshot(4), factory=gate) as jobs:
+        running, waiting = (jobs.start("s1", format="yolo", options=PLAIN) for _ in range(2))
+        assert gate.reached.wait(30)
+        for job in (running, waiting):
+            with pytest.raises(Conflict, match="cancel it before"):
+                jobs.delete(job.id)
+            assert jobs.cancel(job.id).ended is not None
+        jobs.delete(waiting.id)
+        opening = threading.Timer(0.2, gate.open.set)
+        opening.start()
+        jobs.delete(running.id)
+        opening.join()
+        assert jobs.list() == []
+        assert list((folder / ".exports").iterdir()) == []
+        # What comes after them is not held up.
+        again = jobs.start("s1", format="yolo", options=PLAIN)
+        assert jobs.wait(again.id, timeout=60).state == "done"
+
+
+def test_what_a_killed_server_left_of_a_deletion_is_removed(make_snapshot: Make, tmp_path: Path) -> None:
+    folder = tmp_path / "sessions"
+    with jobs_of(folder, make_snapshot(2)) as jobs:
+        job = jobs.wait(jobs.start("s1", format="yolo", options=PLAIN).id, timeout=60)
+    (folder / ".exports" / job.id).rename(folder / ".exports" / f"{job.id}.deleted")
+    with jobs_of(folder) as jobs:
+        assert jobs.list() == []
+    assert list((folder / ".exports").iterdir()) == []
+
+
+def test_a_forecast_is_of_the_session_as_it_is_and_writes_nothing(make_snapshot: Make, tmp_path: Path) -> None:
+    folder = tmp_path / "sessions"
+    with jobs_of(folder, make_snapshot(4), make_snapshot(3, sid="s2")) as jobs:
+        merged = ExportOptions(sessions=("s2",))
+        found = jobs.forecast("s1", format="coco", options=merged)
+        assert (found.frames, [used.id for used in found.sessions]) == (7, ["s1", "s2"])
+        assert not (folder / ".exports").exists()
+        report = jobs.wait(jobs.start("s1", format="coco", options=merged).id, timeout=60).report
+        assert found.model_dump(mode="json")["splits"] == report["splits"]
+        assert found.dropped == report["dropped"]
+        with pytest.raises(NotFound, match="s9"):
+            jobs.forecast("s9", format="yolo", options=PLAIN)
+        with pytest.raises(BadInput, match="nope"):
+            jobs.forecast("s1", format="nope", options=PLAIN)
+        with pytest.raises(Cancelled):
+            jobs.forecast("s1", format="yolo", options=PLAIN, cancelled=lambda: True)
+        jobs.close()
+        with pytest.raises(Cancelled):
+            jobs.forecast("s1", format="yolo", options=PLAIN)

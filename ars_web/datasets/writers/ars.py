@@ -39,6 +39,9 @@ def _join(dataset: Dataset, fragments: Sequence[Path], folder: Path) -> FileDige
 WRITER = Writer(
     format="ars",
     title="ARS raw dataset",
+    description=(
+        "The layout of the original ARS: numbered images, YOLO rows, and for each image which recording it came from."
+    ),
     label_folder="labels",
     image_folder=lambda split: "images",
     write=_write,

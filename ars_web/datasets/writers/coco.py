@@ -208,6 +208,10 @@ def _join(dataset: Dataset, fragments: Sequence[Path], folder: Path) -> FileDige
 WRITER = Writer(
     format="coco",
     title="COCO instances",
+    description=(
+        "For Detectron2, MMDetection and most others: one JSON file a split, with boxes, outlines as "
+        "polygons, the whole object's box, and how much of it is seen and cut off."
+    ),
     label_folder="annotations",
     image_folder=lambda split: "images",
     write=_write,

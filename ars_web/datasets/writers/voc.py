@@ -109,6 +109,9 @@ def _join(dataset: Dataset, fragments: Sequence[Path], folder: Path) -> FileDige
 WRITER = Writer(
     format="voc",
     title="Pascal VOC",
+    description=(
+        "One XML file an image, with marks for truncated and occluded objects, and a list of the images in each split."
+    ),
     label_folder="Annotations",
     image_folder=lambda split: _FOLDER,
     write=_write,

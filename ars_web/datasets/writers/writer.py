@@ -69,6 +69,7 @@ class Writer:
     Attributes:
         format: its key in the registry and on the command line.
         title: its name for people.
+        description: what it is for, and what it holds, in one line.
         label_folder: every file below it is a label file, and `dataset.json`'s sha256 is over those.
         image_folder: from a split to the folder of its images.
         write: writes a shard's label files below the folder `files`, which becomes part of the dataset, and what
@@ -83,6 +84,7 @@ class Writer:
 
     format: str
     title: str
+    description: str
     label_folder: str
     image_folder: Callable[[str], str]
     write: Callable[[Shard, Path, Path], FileDigests]

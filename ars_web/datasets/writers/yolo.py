@@ -99,6 +99,9 @@ def quoted(text: str) -> str:
 WRITER = Writer(
     format="yolo",
     title="YOLO (Ultralytics)",
+    description=(
+        "To train Ultralytics YOLO: images and labels in a folder for each split, and the data.yaml that names them."
+    ),
     label_folder="labels",
     image_folder=lambda split: f"images/{split}",
     write=_write,

@@ -1,0 +1,66 @@
+"""Which labels of planned frames an export keeps, and how many: what is written and what a forecast says of it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool
+
+from ars_web.datasets.plan import ExportPlan
+from ars_web.datasets.report import SplitCounts
+from ars_web.datasets.samples import LabelTable, kept, labels_in_frames
+from ars_web.geometry.camera import Camera, rectified
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """The labels of a run of n frames of one session with b boxes.
+
+    Attributes:
+        cameras: of the images as they are written.
+        table: of all boxes.
+        keep: (n, b) which of them are written.
+        dropped: how many are not, by reason.
+    """
+
+    cameras: dict[int, Camera]
+    table: LabelTable
+    keep: Bool[np.ndarray, "n b"]
+    dropped: dict[str, int]
+
+
+def select_labels(plan: ExportPlan, start: int, stop: int, *, with_visible: bool = False) -> Selection:
+    """The labels of the plan's frames from `start` up to `stop`, all of one session.
+
+    Visible shares are found where the options drop labels by them, or `with_visible` asks for them.
+    """
+    frames = plan.frames
+    session = plan.sessions[int(frames.session[start])]
+    rectify = plan.options.images == "rectify"
+    cameras = {i: rectified(c) if rectify else c for i, c in session.cameras.items()}
+    table = labels_in_frames(
+        cameras,
+        frames.camera_id[start:stop],
+        frames.Ts_world_camera[start:stop],
+        session.boxes,
+        with_visible=with_visible or plan.options.min_visible > 0,
+    )
+    return Selection(cameras, table, *kept(table, plan.options))
+
+
+def split_counts(
+    splits: Sequence[str], keep: Bool[np.ndarray, "n b"], class_of_box: Sequence[int], class_names: Sequence[str]
+) -> dict[str, SplitCounts]:
+    """Images and labels of each split among `splits`, one a frame; `class_of_box` are places in `class_names`."""
+    found: dict[str, SplitCounts] = {}
+    of_frame, of_box = np.array(splits), np.array(class_of_box, dtype=np.int64)
+    for split in sorted(set(splits)):
+        chosen = keep[of_frame == split]
+        per_class = np.bincount(of_box, weights=chosen.sum(axis=0), minlength=len(class_names))
+        found[split] = SplitCounts(
+            images=len(chosen),
+            negatives=int((~chosen.any(axis=1)).sum()),
+            labels=int(chosen.sum()),
+            classes=dict(zip(class_names, per_class.astype(int).tolist(), strict=True)),
+        )
+    return found
