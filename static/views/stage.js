@@ -4,6 +4,7 @@ import { command, press } from "../commands.js";
 import { Icon } from "../lib/icon.js";
 import { html, useEffect, useRef, useSignal, useSignalEffect } from "../lib/view.js";
 import * as store from "../store.js";
+import { Hints } from "./hints.js";
 import { PointsTool } from "./points_tool.js";
 import { ExportPanel } from "./export/panel.js";
 
@@ -45,7 +46,7 @@ export function Stage({ view }) {
       src=${`/scene/${encodeURIComponent(store.sid.value)}/${view}/?fixedDpr=${fixedRatio()}`}
     ></iframe>
     ${!ready.value && !filled && html`<div class="cover" role="status">Opening the scene</div>`}
-    ${!filled && html`<${Overlays} />`}
+    ${!filled && html`<${Overlays} /><${Hints} />`}
     ${store.mode.value === "export" && html`<div class="filled"><${ExportPanel} /></div>`}
     ${store.mode.value !== "export" && store.tool.value === "points" && html`<div class="filled"><${PointsTool} /></div>`}
   </main>`;

@@ -5,7 +5,6 @@ import * as store from "../store.js";
 import { BottomBar } from "./bottom_bar.js";
 import { ContactSheet } from "./contact_sheet.js";
 import { Help } from "./help.js";
-import { Hints } from "./hints.js";
 import { Palette } from "./palette.js";
 import { SidePanel } from "./side_panel.js";
 import { Stage } from "./stage.js";
@@ -22,7 +21,6 @@ export function Workspace({ view }) {
       <aside class="side-panel" aria-label="Boxes and numbers"><${SidePanel} /></aside>
       <div class="bottom-bar"><${BottomBar} /></div>
     </div>
-    <${Hints} />
     ${store.overlay.value === "help" && html`<${Help} />`}
     ${store.overlay.value === "palette" && html`<${Palette} />`}
     ${store.overlay.value === "contact-sheet" && html`<${ContactSheet} />`}
