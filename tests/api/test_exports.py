@@ -4,6 +4,7 @@ import hashlib
 import io
 import json
 import shutil
+import threading
 import zipfile
 from typing import Any
 
@@ -11,6 +12,7 @@ import httpx
 import pytest
 
 from ars_web.api.models import ExportJson
+from ars_web.errors import Cancelled
 
 
 @pytest.fixture
@@ -178,3 +180,73 @@ def test_an_export_survives_a_restart(run_server, tmp_path, until) -> None:
         assert server.client.get(f"/api/exports/{job['id']}").json() == job
         digests.append(hashlib.sha256(server.client.get(f"/api/exports/{job['id']}/download").content).hexdigest())
     assert digests[0] == digests[1]
+
+
+def test_a_preview_says_what_the_export_then_writes(client: httpx.Client, labelled: str, until) -> None:
+    path = f"/api/sessions/{labelled}/exports"
+    body = {"format": "coco", "options": {"frames": {"step": 2}, "min_visible": 0.1, "images": "copy"}}
+    preview = client.post(f"{path}/preview", json=body)
+    assert preview.status_code == 200, preview.text
+    found = preview.json()
+    assert client.get(path).json() == []
+    report = finished(client, client.post(path, json=body), until)["report"]
+    for same in ("format", "options", "sessions", "classes", "splits", "dropped"):
+        assert found[same] == report[same], same
+    assert (found["frames"], found["images"]) == (3, {"linked": 0, "copied": 3, "encoded": 0})
+    assert found["image_bytes"] == found["new_bytes"] > 0
+    for bad in (
+        {"format": "nope"},
+        {"format": "coco", "options": {"frames": {"start": 99}}},
+        {"format": "coco", "x": 1},
+    ):
+        assert client.post(f"{path}/preview", json=bad).status_code == 422
+    assert client.post("/api/sessions/nope/exports/preview", json=body).status_code == 404
+
+
+def test_a_preview_ends_when_nobody_waits_for_it(
+    server, client: httpx.Client, labelled: str, until, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, ended = threading.Event(), threading.Event()
+
+    def slow(sid: str, *, cancelled, **more: object) -> None:
+        begun.set()
+        until(cancelled)
+        ended.set()
+        raise Cancelled("nobody waits")
+
+    monkeypatch.setattr(server.services.exports, "forecast", slow)
+    with server.stranger(Authorization=client.headers["authorization"]) as impatient:
+        with pytest.raises(httpx.ReadTimeout):
+            impatient.post(f"/api/sessions/{labelled}/exports/preview", json={"format": "coco"}, timeout=0.5)
+        assert begun.is_set()
+    assert ended.wait(20)
+    assert client.get("/api/health").status_code == 200
+
+
+def test_an_export_is_deleted_once_it_has_ended(client: httpx.Client, labelled: str, until) -> None:
+    path = f"/api/sessions/{labelled}/exports"
+    job = finished(client, client.post(path, json={"format": "voc"}), until)
+    assert job["ended"] >= job["created"]
+    assert job["bytes"] == sum(
+        info.file_size
+        for info in zipfile.ZipFile(io.BytesIO(client.get(f"/api/exports/{job['id']}/download").content)).infolist()
+    )
+    assert client.delete(f"/api/exports/{job['id']}").status_code == 204
+    assert client.get(path).json() == []
+    for gone in (client.get(f"/api/exports/{job['id']}"), client.delete(f"/api/exports/{job['id']}")):
+        assert gone.status_code == 404
+
+
+def test_an_export_that_is_not_over_is_not_deleted(
+    client: httpx.Client, labelled: str, until, server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened = threading.Event()
+    make = server.services.exports._plan
+    monkeypatch.setattr(server.services.exports, "_plan", lambda *given: (opened.wait(30), make(*given))[1])
+    job = client.post(f"/api/sessions/{labelled}/exports", json={"format": "voc"})
+    refused = client.delete(job.headers["location"])
+    assert (refused.status_code, refused.json()["type"]) == (409, "urn:ars-web:problem:conflict")
+    assert "cancel it before" in refused.json()["detail"]
+    opened.set()
+    assert finished(client, job, until)["state"] == "done"
+    assert client.delete(job.headers["location"]).status_code == 204
