@@ -45,11 +45,20 @@ class SessionEvent:
 
 @dataclass(eq=False)
 class _Topic:
-    """One session that someone listens to; `changed` is set, and replaced, whenever its log may have grown."""
+    """One session that someone listens to.
+
+    Attributes:
+        changed: set, and replaced, whenever its log may have grown.
+        newest: what was read last: (after which revision, the `changed` of then, the events). All who are up to
+            date want the same; one of them reads it.
+        reading: held by who reads.
+    """
 
     listeners: int = 0
     revision: int = -2
     changed: asyncio.Event = field(default_factory=asyncio.Event)
+    newest: tuple[int, asyncio.Event | None, list[SessionEvent]] = (-1, None, [])
+    reading: asyncio.Lock = field(default_factory=asyncio.Lock)
 
 
 class EventHub:
@@ -118,13 +127,13 @@ class EventHub:
             while not self._closing:
                 changed = topic.changed
                 try:
-                    edits = await run_in_threadpool(self._store.edits, sid, after=sent, limit=EDITS_AT_ONCE)
+                    edits = await self._edits(topic, sid, after=sent)
                 except NotFound:
                     yield SessionEvent("gone", sent, sent)
                     return
                 for edit in edits:
                     sent = edit.revision
-                    yield SessionEvent("edit", sent, sent, EditJson.of(edit))
+                    yield edit
                 if edits or self._closing:
                     continue
                 try:
@@ -138,6 +147,17 @@ class EventHub:
         async with aclosing(self.follow(sid, after=after)) as events:
             async for event in events:
                 yield _in_stream(event)
+
+    async def _edits(self, topic: _Topic, sid: str, *, after: int) -> list[SessionEvent]:
+        async with topic.reading:
+            changed = topic.changed
+            if topic.newest[:2] != (after, changed):
+                topic.newest = (after, changed, await run_in_threadpool(self._read, sid, after))
+            return topic.newest[2]
+
+    def _read(self, sid: str, after: int) -> list[SessionEvent]:
+        edits = self._store.edits(sid, after=after, limit=EDITS_AT_ONCE)
+        return [SessionEvent("edit", edit.revision, edit.revision, EditJson.of(edit)) for edit in edits]
 
     @contextmanager
     def _listening(self, sid: str) -> Generator[_Topic]:
