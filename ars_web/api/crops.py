@@ -9,7 +9,7 @@ from ars_web.errors import BadInput
 LEAST_MARGIN = 8
 """Pixels round a box, at least."""
 
-MARGIN = 0.15
+MARGIN = 0.1
 """Of the box's longer side."""
 
 UNIT = (32, 24)

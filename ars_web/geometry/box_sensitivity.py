@@ -22,6 +22,10 @@ from ars_web.geometry.projection_jacobian import pixels_with_jacobian
 
 PARAMETERS = 9
 
+ENOUGH_CORNERS = 4
+"""That a chosen frame shows, where there are frames enough that do: of what is nearly out of the image, or mostly
+hidden by itself, a person sees too little to judge, however near it is."""
+
 APART = math.radians(10)
 """Between the sides from which chosen frames show a box. Two frames from one side are off by much the same, as their
 poses are, and a person sees the same in both."""
@@ -70,22 +74,28 @@ def telling_frames(
     count: int,
 ) -> list[TellingFrame]:
     """At most `count` frames that together leave no error of the box unseen, the most telling first; fewer where fewer
-    frames show the box at all.
+    frames show a corner of it.
 
     Raises:
         BadInput: `count` is below 1.
     """
     if count < 1:
         raise BadInput(f"at least 1 frame must be asked for, not {count}")
-    candidates: list[np.ndarray] = []
-    informations: list[np.ndarray] = []
-    for camera_id in np.unique(camera_ids).tolist():
-        rows = np.flatnonzero(camera_ids == camera_id)
-        slopes = corner_slopes(by_id[camera_id], Ts_world_camera[rows], box)
-        shown = slopes.seen.any(axis=1)
-        candidates.append(rows[shown])
-        informations.append(information(CornerSlopes(slopes.seen[shown], slopes.by_place[shown]), box))
-    frames, matrices = np.concatenate(candidates), np.concatenate(informations)
+    found = [
+        (rows, corner_slopes(by_id[camera_id], Ts_world_camera[rows], box))
+        for camera_id in np.unique(camera_ids).tolist()
+        for rows in [np.flatnonzero(camera_ids == camera_id)]
+    ]
+    corners = np.bincount(np.concatenate([slopes.seen.sum(axis=1) for _, slopes in found]), minlength=9)
+    enough = [least for least in range(1, ENOUGH_CORNERS + 1) if corners[least:].sum() >= count]
+    shown = [slopes.seen.sum(axis=1) >= max(enough, default=1) for _, slopes in found]
+    frames = np.concatenate([rows[some] for (rows, _), some in zip(found, shown, strict=True)])
+    matrices = np.concatenate(
+        [
+            information(CornerSlopes(slopes.seen[some], slopes.by_place[some]), box)
+            for (_, slopes), some in zip(found, shown, strict=True)
+        ]
+    )
     towards = Ts_world_camera[frames, :3, 3] - box.T_world_box[:3, 3]
     sides = towards / np.linalg.norm(towards, axis=1, keepdims=True)
     chosen = [int(frames[i]) for i in most_informative(matrices, prior(box), sides, count=count)]

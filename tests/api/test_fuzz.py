@@ -39,6 +39,8 @@ BODIES: dict[str, st.SearchStrategy[Any]] = {
         frame_of=st.sampled_from(["world", "camera"]),
         frame=numbers,
     ),
+    "POST /labels": shaped(boxes=st.lists(shaped(T_world_box=transforms, size=vectors)), frames=st.lists(numbers)),
+    "POST /points": shaped(observations=st.lists(shaped(frame=numbers, x=numbers, y=numbers), max_size=4)),
     "POST /classes": shaped(name=texts, color=texts),
     "PATCH /classes/0": shaped(name=texts, color=texts),
     "PATCH ": shaped(name=texts),

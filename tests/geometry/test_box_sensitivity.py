@@ -202,6 +202,24 @@ def test_frames_that_do_not_show_the_box_are_not_chosen():
     assert sensitivity.telling_frames({0: BROWN}, np.zeros(12, dtype=np.int64), away, BOX, count=6) == []
 
 
+def test_frames_that_show_a_corner_only_are_left_to_the_last():
+    """A near one, turned away until one corner is left in the image, and two far ones that show all of the box."""
+    whole = circling(40)[:2]
+    near = circling(40)[30:31]
+    turned = near
+    for angle in np.linspace(0.0, 1.5, 400):
+        turn = rigid_transform.rotation_from_wxyz(np.array([np.cos(angle / 2), 0.0, np.sin(angle / 2), 0.0]))
+        turned = near @ rigid_transform.from_rotation(turn, np.zeros(3))
+        if sensitivity.corner_slopes(BROWN, turned, BOX).seen.sum() == 1:
+            break
+    assert sensitivity.corner_slopes(BROWN, turned, BOX).seen.sum() == 1
+    Ts, ids = np.concatenate([turned, whole]), np.zeros(3, dtype=np.int64)
+    for count, expected in ((1, 1), (2, 2), (3, 3)):
+        rows = {one.frame for one in sensitivity.telling_frames({0: BROWN}, ids, Ts, BOX, count=count)}
+        assert len(rows) == expected
+        assert (0 in rows) == (count == 3)
+
+
 def test_frames_of_several_cameras_are_weighed_together():
     """The one with four times the pixels tells most."""
     fine = Camera(2560, 1920, 2001.5, 2021.5, 1201.5, 1001.5, "brown", BROWN.distortion)
