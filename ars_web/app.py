@@ -43,6 +43,7 @@ from ars_web.api.body_limit import BodyLimit
 from ars_web.api.credentials import CODE_LIFETIME, Cookies, LoginCodes, install_token
 from ars_web.api.dependencies import Services
 from ars_web.api.events import EventHub
+from ars_web.api.head_requests import HeadRequests
 from ars_web.api.live_line import GOODBYE_SECONDS, LiveLines
 from ars_web.api.pictures import Pictures
 from ars_web.api.presence import Presence
@@ -108,6 +109,7 @@ def create_app(settings: Settings) -> FastAPI:
     openapi.install(app)
     app.mount("/static", StaticFiles(directory=static), name="static")
     # The last one added is the first to see a request.
+    app.add_middleware(HeadRequests)
     app.add_middleware(BodyLimit, largest=settings.largest_body)
     app.add_middleware(problems.Unexpected)
     app.add_middleware(Guard, door=lambda: app.state.services.door)
