@@ -68,9 +68,10 @@ export function ContactSheet() {
 
   const [active, setActive] = useState(() => Math.floor(frame.peek() / step));
   const at = Math.max(0, Math.min(listed.length - 1, active));
-  const moving = useRef(false);
+  // The focus goes to the tile of the frame at hand, as soon as that is there.
+  const moving = useRef(true);
   useLayoutEffect(() => {
-    if (!moving.current || sheet.current === null) return;
+    if (!moving.current || sheet.current === null || width === 0) return;
     const row = Math.floor(at / columns);
     const [top, bottom] = [row * pitch, PADDING * 2 + (row + 1) * pitch];
     if (top < sheet.current.scrollTop) sheet.current.scrollTop = top;
@@ -186,7 +187,7 @@ function Nothing({ count, name, unchecked, step }) {
 
 /** @param {number} listed @param {number} all @param {boolean} only @param {number} unchecked */
 function countWords(listed, all, only, unchecked) {
-  if (!only) return `${all} of the frames`;
+  if (!only) return `${all} ${all === 1 ? "frame" : "frames"}`;
   return unchecked > 0 ? `${listed} found, ${unchecked} of ${all} still to look at` : `${listed} of ${all}`;
 }
 

@@ -26,7 +26,7 @@ function Wireframes({ drawn, size }) {
   // The selected box last: over the others.
   const seen = drawn.filter(({ boxId, inImage }) => inImage && !hidden.value.has(boxId));
   const order = [...seen.filter(({ boxId }) => boxId !== chosen), ...seen.filter(({ boxId }) => boxId === chosen)];
-  return html`<svg class="wireframes" viewBox=${`0 0 ${size.width} ${size.height}`} preserveAspectRatio="none" aria-hidden="true">
+  return html`<svg class="wireframes" viewBox=${`0 0 ${size.width} ${size.height}`} aria-hidden="true">
     ${order.map(
       ({ boxId, classId, wireframe }) =>
         html`<path
