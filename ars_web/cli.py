@@ -16,7 +16,7 @@ import typer
 
 from ars_web import arguments as take
 from ars_web import kernel_cache
-from ars_web.errors import ArsError, BadInput
+from ars_web.errors import ArsError, BadFile, BadInput
 from ars_web.terminal import has_screen, note, open_browser, print_json, print_table, progress, write_json
 
 if TYPE_CHECKING:
@@ -175,7 +175,11 @@ def import_boxes(
     from ars_web.sessions.store import SessionStore
 
     with SessionStore(sessions) as store:
-        added = SessionEditor(store).add_boxes(store.find(session), read_boxes_file(file), author=AUTHOR)
+        sid, drafts = store.find(session), read_boxes_file(file)
+        try:
+            added = SessionEditor(store).add_boxes(sid, drafts, author=AUTHOR)
+        except BadInput as error:
+            raise BadFile(file, f"{error}; boxes are counted from 0") from error
     if as_json:
         print_json([box_json(box) for box in added])
     else:

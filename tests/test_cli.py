@@ -268,6 +268,9 @@ def test_what_is_wrong_with_the_input_ends_with_1_and_one_line(
     damaged = tmp_path / "boxes.json"
     damaged.write_text('[{"class_id": 0}]')
     assert "boxes.json" in one_line(run("boxes", "import", session, damaged, status=1))
+    damaged.write_text(json.dumps([BOX, {**BOX, "class_id": 77}]))
+    line = one_line(run("boxes", "import", session, damaged, status=1))
+    assert "boxes.json: box 1: there is no class 77 in this session; its classes are: 0 " in line
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "file").touch()
     assert "full" in one_line(run("export", session, "--format", "yolo", "--out", tmp_path / "full", status=1))
