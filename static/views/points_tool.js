@@ -131,8 +131,8 @@ function instruction(left, right) {
 
 /** @param {number | null} degrees */
 function angleWords(degrees) {
-  if (degrees === null) return "No good angle was found";
-  return isGoodAngle(degrees) ? `about ${degrees.toFixed(0)}° between the views` : `only about ${degrees.toFixed(0)}° between the views: look for a better one`;
+  if (degrees === null) return "no good angle was found";
+  return isGoodAngle(degrees) ? `about ${degrees.toFixed(0)}° apart` : `only about ${degrees.toFixed(0)}° apart: look for a better one`;
 }
 
 /** @param {number} index @returns {Promise<{x: number, y: number} | null>} null: the server does not say */

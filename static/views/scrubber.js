@@ -2,6 +2,7 @@
 
 import { html, useLayoutEffect, useRef, useState } from "../lib/view.js";
 import { niceStep } from "../lib/nice_step.js";
+import { personColor } from "../lib/person.js";
 import { actions, frame, frames, jump, people } from "../store.js";
 import { FrameImage } from "./frame_image.js";
 
@@ -88,7 +89,7 @@ export function Scrubber({ marks, shown, aspect }) {
         (person) =>
           html`<span
             key=${`p${person.view}`} class="mark person-mark" title=${`${person.name || "Someone"} is at frame ${person.frame}`}
-            style=${{ left: place(person.frame ?? 0) }}
+            style=${{ left: place(person.frame ?? 0), background: personColor(person.view) }}
           />`,
       )}
       ${count > 0 && html`<span class="marker" style=${{ left: place(frame.value) }} />`}

@@ -5,7 +5,7 @@ import { Icon } from "../lib/icon.js";
 import { html, useEffect, useRef, useSignal, useSignalEffect } from "../lib/view.js";
 import * as store from "../store.js";
 import { Hints } from "./hints.js";
-import { PointsTool } from "./points_tool.js";
+import { MadeBox, PointsTool } from "./points_tool.js";
 import { ExportPanel } from "./export/panel.js";
 
 /** @param {{view: string}} props `view`: the name by which the server knows the page's scene */
@@ -74,6 +74,7 @@ function Overlays() {
         : html`<button class="chip button" onClick=${() => store.actions.enterFrame()} title="Enter this frame (F)">
             <${Icon} name="image" size=${14} />Enter
           </button>`}
+      <${MadeBox} />
     </div>
     <div class="corner bottom-left">
       ${inFrame &&

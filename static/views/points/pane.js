@@ -6,7 +6,11 @@ import { html, useEffect, useLayoutEffect, useRef, useState } from "../../lib/vi
 import { actions, frames } from "../../store.js";
 import { corners, current, choose, mark, move } from "./corners.js";
 
-const AXES = ["--z", "--x", "--y"];
+/** Over a photo it is the photo that colours must stand out from, not the page's theme. */
+const CURRENT = "#4aa8ff";
+const OTHERS = "#ffffff";
+/** Of the edges between the corners: along z, x and y. */
+const AXES = ["#6cb6ff", "#ff7b72", "#56d364"];
 
 /**
  * @param {object} props
@@ -62,9 +66,9 @@ export function PointsPane({ name, frame, other, active, onFrame, onActive, onSu
       return points.length > 0 ? [{ points, color, width: 1.5 }] : [];
     });
     pane.current.overlay = {
-      lines: [...curve.lines.map((points) => ({ points, color: "--accent", width: 1.5, dash: [7, 5] })), ...edges],
+      lines: [...curve.lines.map((points) => ({ points, color: CURRENT, width: 1.5, dash: [7, 5] })), ...edges],
       points: seen.flatMap((at, i) =>
-        at === undefined ? [] : [{ id: String(i), ...at, label: `P${i}`, color: i === corner ? "--accent" : "#ffffff", active: i === corner }],
+        at === undefined ? [] : [{ id: String(i), ...at, label: `P${i}`, color: i === corner ? CURRENT : OTHERS, active: i === corner }],
       ),
     };
   }, [all, frame, corner, curve]);

@@ -6,7 +6,7 @@ import { CORNERS, NEEDED, begun, choose, corners, current, locations, points, st
 import { Diagram } from "./diagram.js";
 import { isGoodAngle } from "./partner_frame.js";
 
-const WHICH = ["a lower corner", "the corner above it", "the next one along x", "the next one along y"];
+const WHICH = ["lower corner", "above it", "then along x", "then along y"];
 /** Pixels off, beyond which a corner is worth another look. */
 const MUCH = 3;
 
