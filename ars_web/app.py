@@ -49,6 +49,7 @@ from ars_web.api.pictures import Pictures
 from ars_web.api.presence import Presence
 from ars_web.api.security import Door, Guard
 from ars_web.api.telling import TellingViews
+from ars_web.api.websocket_wire import WebsocketWire
 from ars_web.datasets.exports import ExportJobs
 from ars_web.errors import BadInput, StoreError
 from ars_web.scene.server import SceneServers
@@ -63,7 +64,7 @@ SHUTDOWN_SECONDS = 5
 """How long a server that is stopped waits for answers that are being sent."""
 
 WEBSOCKETS: Mapping[str, Any] = {
-    "ws": "websockets-sansio",
+    "ws": WebsocketWire,
     "ws_max_size": 2**20,
     # A page that vanished, with its laptop's lid or its network, is noticed after twice that.
     "ws_ping_interval": 20.0,
