@@ -21,7 +21,7 @@ from ars_web.recordings.images import read_reduced
 from ars_web.scene.extent import Extent
 from ars_web.sessions.model import FrameTable
 
-MOST_FRUSTA = 1000
+MOST_FRUSTA = 300
 
 NEIGHBOURS = 3
 """Frames before and after the current one whose frusta are drawn, wherever the path has been thinned out."""
@@ -115,7 +115,7 @@ def add_cameras(scene: viser.SceneApi, frames: FrameTable, cameras: Mapping[int,
         f"{NODE}/points",
         (centres - extent.focus).astype(np.float32),
         colors=PATH_COLOR,
-        point_size=0.1 * extent.frustum_depth,
+        point_size=0.06 * extent.frustum_depth,
         point_shape="square",
         point_shading="flat",
         precision="float32",

@@ -55,17 +55,17 @@ def recording_extent(Ts_world_camera: Float[np.ndarray, "n 4 4"]) -> Extent:
     centres, forwards = Ts[:, :3, 3], Ts[:, :3, 2]
     middle = np.median(centres, axis=0)
     spread = float(np.percentile(np.linalg.norm(centres - middle, axis=1), 95))
+    ground = min(0.0, float(Ts_world_camera[:, 2, 3].min()))
     focus = _common_focus(centres, forwards, spread)
     if focus is None:
         ahead = forwards.mean(axis=0)
-        focus = middle + ahead * (0.5 * spread if spread > 0 else 1.0)
+        focus = middle + ahead * _sight(float(middle[2]) - ground, -float(ahead[2]), spread)
     radius = max(float(np.percentile(np.linalg.norm(centres - focus, axis=1), 95)), 1e-3)
-    lowest = float(Ts_world_camera[:, 2, 3].min())
     outwards = centres.mean(axis=0)[:2] - focus[:2]
     return Extent(
         focus=focus,
         radius=radius,
-        ground=min(0.0, lowest),
+        ground=ground,
         towards_cameras=math.atan2(outwards[1], outwards[0]) if np.hypot(*outwards) > 0.05 * radius else -math.pi / 2,
         frustum_depth=0.08 * radius,
     )
@@ -80,13 +80,31 @@ def _common_focus(
     """
     across = np.eye(3) - forwards[:, :, None] * forwards[:, None, :]
     normal = across.mean(axis=0)
-    if np.linalg.eigvalsh(normal)[0] < 0.01:  # the axes are nearly parallel
+    if np.linalg.eigvalsh(normal)[0] < PARALLEL:
         return None
     point = np.linalg.solve(normal, np.einsum("nij,nj->i", across, centres) / len(centres))
-    ahead = np.einsum("ni,ni->n", point - centres, forwards)
     distance = np.linalg.norm(point - centres, axis=1)
-    looked_at = (ahead > 0.8 * distance) & (distance < 10 * max(spread, 1e-3))
+    ahead = np.einsum("ni,ni->n", point - centres, forwards)
+    looked_at = (ahead > LOOKED_AT * distance) & (distance < FARTHEST * spread)
     return point if looked_at.mean() > 0.7 else None
+
+
+PARALLEL = 1e-4
+"""The mean square of the sines between optical axes, below which they have no common point worth the name."""
+
+LOOKED_AT = math.cos(math.radians(22))
+FARTHEST = 30.0
+"""What cameras look at is this near to their optical axes, and nearer than that many times the path's extent."""
+
+
+def _sight(height: float, downwards: float, spread: float) -> float:
+    """How far ahead of cameras, which are `height` above the ground, to expect what they were taken for.
+
+    The ground a little below the picture's middle, but not within the path's own extent, nor ten times that far.
+    """
+    angle = math.asin(min(max(downwards, -1.0), 1.0)) + 0.25
+    near = max(spread, 0.5 * height, 1e-3) if spread > 0 or height > 0 else 1.0
+    return min(max(height / math.sin(angle), near), 10 * near) if 0 < angle < math.pi / 2 and height > 0 else near
 
 
 def overview(extent: Extent, corners_world: Float[np.ndarray, "n 3"]) -> Viewpoint:

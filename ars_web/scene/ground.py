@@ -1,37 +1,42 @@
-"""The ground's grid, and the axes of the world on it."""
+"""The ground's grid, and the axes of the world on it.
+
+The grid is lines: viser's own is a shader over every pixel below the horizon, which costs half a second a frame where
+there is no graphics card.
+"""
 
 import math
 
 import numpy as np
 import viser
+from jaxtyping import Float
 
 from ars_web.scene.extent import Extent
+
+CELL_COLOR = (96, 106, 120)
+SECTION_COLOR = (118, 130, 146)
+
+AXIS_COLORS = ((232, 72, 85), (79, 178, 92), (64, 132, 240))
+"""X, Y, Z."""
+
+SECTION = 5
+"""Cells from one stronger line to the next."""
 
 
 def add_ground(scene: viser.SceneApi, extent: Extent) -> None:
     """Add the grid under the recording, with about twenty cells across, and the world's axes at its origin."""
     cell = grid_cell(extent.radius)
-    half = math.ceil(1.6 * extent.radius / cell) * cell
+    half = math.ceil(1.6 * extent.radius / (SECTION * cell)) * SECTION
     # Lines lie on whole cells of the world, so that they can be counted from its axes.
-    middle = np.round(extent.focus[:2] / (5 * cell)) * (5 * cell)
-    scene.add_grid(
-        "/ground",
-        width=2 * half,
-        height=2 * half,
-        plane="xy",
-        cell_size=cell,
-        section_size=5 * cell,
-        cell_color=(110, 120, 133),
-        section_color=(128, 140, 155),
-        cell_thickness=0.6,
-        section_thickness=1.0,
-        fade_distance=12 * extent.radius,
-        fade_strength=1.0,
-        shadow_opacity=0.0,
-        position=(float(middle[0]), float(middle[1]), extent.ground),
-    )
-    length = 2 * cell
-    ends = np.eye(3, dtype=np.float32) * length
+    x, y = np.round(extent.focus[:2] / (SECTION * cell)) * (SECTION * cell)
+    scene.add_frame("/ground", show_axes=False, position=(float(x), float(y), extent.ground))
+    steps = np.arange(-half, half + 1)
+    for name, chosen, color in (
+        ("cells", steps % SECTION != 0, CELL_COLOR),
+        ("sections", steps % SECTION == 0, SECTION_COLOR),
+    ):
+        lines = grid_lines(steps[chosen] * cell, half=half * cell)
+        scene.add_line_segments(f"/ground/{name}", lines, color, thickness=1.0, thickness_units="screen")
+    ends = np.eye(3, dtype=np.float32) * 2 * cell
     scene.add_line_segments(
         "/axes",
         np.stack([np.zeros_like(ends), ends], axis=1),
@@ -41,8 +46,11 @@ def add_ground(scene: viser.SceneApi, extent: Extent) -> None:
     )
 
 
-AXIS_COLORS = ((232, 72, 85), (79, 178, 92), (64, 132, 240))
-"""X, Y, Z."""
+def grid_lines(stations: Float[np.ndarray, "n"], *, half: float) -> Float[np.ndarray, "m 2 3"]:
+    """Lines along y at each station on x, then along x at each on y, m = 2 n, all `half` long either way; z is 0."""
+    ends = np.array([-half, half])
+    along_y = np.stack(np.broadcast_arrays(stations[:, None], ends[None, :], 0.0), axis=-1)
+    return np.concatenate([along_y, along_y[..., [1, 0, 2]]]).astype(np.float32)
 
 
 def grid_cell(radius: float) -> float:
