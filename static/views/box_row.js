@@ -37,11 +37,11 @@ export function BoxRow({ id, box, index, offset, visitors = [], renaming, onRena
         aria-label=${`Selected by ${person.name || "someone"}`} title=${`Selected by ${person.name || "someone"}`}
       >${initials(person.name)}</span>`,
     )}</span>`}
-    <span class="size muted" role="gridcell">${sizeText(box.size)}</span>
-    <span role="gridcell">
+    <span class="lock-cell" role="gridcell">
       <${RowButton} class="lock" icon=${box.locked ? "lock" : "lock-open"} pressed=${box.locked} label=${`Lock ${box.name}`}
         title=${box.locked ? "Unlock (K)" : "Lock (K)"} run=${() => toggleLock(box)} />
     </span>
+    <span class="size muted" role="gridcell">${sizeText(box.size)}</span>
     <span role="gridcell">
       <${RowButton} class="eye" icon=${isHidden ? "eye-off" : "eye"} pressed=${isHidden} label=${`Hide ${box.name}`}
         title=${isHidden ? "Show on this page (H)" : "Hide on this page (H)"} run=${() => toggleHidden(box.id)} />

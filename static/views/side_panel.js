@@ -25,11 +25,10 @@ export function SidePanel() {
     <div class="panel-body" role="tabpanel" id="panel-body" aria-labelledby=${`tab-${shown}`}>
       <${ConflictCard} />
       ${shown === "boxes"
-        ? html`<${BoxesList} /><${BoxNumbers} /><${TellingFrames} /><${Classes} />`
+        ? html`<${BoxesList} /><${BoxNumbers} /><${TellingFrames} /><${Classes} /><${Facts} />`
         : html`<${HistoryPanel} />`}
     </div>
     <div class="panel-foot">
-      <${Facts} />
       <button class="button main" disabled=${store.mode.value === "export"} onClick=${command("mode-export").run}>Export training set</button>
     </div>`;
 }

@@ -1,6 +1,7 @@
 /** Whether drags snap, and to what. */
 
 import { command } from "../commands.js";
+import { Icon } from "../lib/icon.js";
 import { Popover } from "../lib/popover.js";
 import { parseQuantity, trimmed } from "../lib/quantity.js";
 import { html, useRef, useSignal } from "../lib/view.js";
@@ -14,11 +15,11 @@ export function SnapButton() {
   const button = useRef(/** @type {HTMLElement | null} */ (null));
   const on = store.snapLength.value > 0 || store.snapAngle.value > 0;
   return html`<div class="joined">
-    <button class="button small" aria-pressed=${on} onClick=${command("snap").run} title=${`Drags go in steps (${command("snap").keys[0]})`}>Snap</button>
+    <button class="button small" aria-pressed=${on} onClick=${command("snap").run} title=${`Drags go in steps: ${words()} (${command("snap").keys[0]})`}>Snap</button>
     <button
-      ref=${button} class="button small" aria-haspopup="dialog" aria-expanded=${open.value} aria-label="Steps to snap to"
+      ref=${button} class="button small chooser" aria-haspopup="dialog" aria-expanded=${open.value} aria-label="Steps to snap to" title="Steps to snap to"
       onClick=${() => (open.value = !open.value)}
-    >${words()}</button>
+    ><${Icon} name="chevron-down" size=${14} /></button>
     ${open.value &&
     html`<${Popover} label="Steps to snap to" anchor=${button} onClose=${() => (open.value = false)}>
       <${Step} kind="length" label="Move and resize in steps of" shown=${() => `${trimmed(store.snapLength.value * 1000, 0, 3)} mm`}
