@@ -179,7 +179,7 @@ def most_informative(
     while len(chosen) < min(count, len(matrices)):
         cosine = np.cos(apart) if apart > 0 else np.inf
         free = np.all(sides @ sides[chosen].T < cosine, axis=1)
-        rows = np.setdiff1d(np.flatnonzero(free), chosen)
+        rows = np.flatnonzero(free & (bounds > -np.inf))
         if len(rows) == 0:
             apart = apart / 2 if apart > CLOSEST else 0.0
             continue
@@ -196,6 +196,7 @@ def most_informative(
             best = top if best < 0 or bounds[top] > bounds[best] else best
         chosen.append(best)
         known = known + matrices[best]
+        bounds[best] = -np.inf
     return chosen
 
 
