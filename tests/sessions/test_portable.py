@@ -267,6 +267,34 @@ TAMPERINGS = {
         "UPDATE box SET size_x = 7",
         "the log and the tables differ in box 1",
     ),
+    "a box locked in the table": (
+        "UPDATE box SET locked = 1",
+        "the log and the tables differ in box 1",
+    ),
+    "a lock that is none": (
+        "UPDATE box SET locked = 'yes'",
+        "box.locked holds a value that is no integer",
+    ),
+    "a class given a size in the table": (
+        "UPDATE object_class SET default_size = '[1, 2, 3]' WHERE id = 0",
+        "differ in class 0",
+    ),
+    "a class with a size that is none": (
+        "UPDATE object_class SET default_size = '[0, 1, 1]' WHERE id = 0",
+        "a class's size in the session's database cannot be read: .*each > 0",
+    ),
+    "a class with a size that is no JSON": (
+        "UPDATE object_class SET default_size = 'big' WHERE id = 0",
+        "a class's size in the session's database cannot be read",
+    ),
+    "a class with numbers instead of a size": (
+        "UPDATE object_class SET default_size = '7' WHERE id = 0",
+        "a class's size in the session's database cannot be read",
+    ),
+    "a size in the log that is none": (
+        """UPDATE edit SET changes = replace(changes, '"default_size":null', '"default_size":[1,"a",2]')""",
+        "an entry of the session's log",
+    ),
     "a class renamed in the table": (
         "UPDATE object_class SET name = 'x' WHERE id = 0",
         "differ in class 0",
