@@ -6,16 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
-import numpy as np
 from cachetools import LRUCache, cached
-from jaxtyping import UInt8
 
 from ars_web.api.crops import Crop
 from ars_web.datasets.images import rectify
 from ars_web.errors import BadFile, NotFound, RefusedPath
 from ars_web.geometry.camera import Camera
 from ars_web.recordings.image_header import read_header
-from ars_web.recordings.images import read_image
+from ars_web.recordings.images import REDUCTIONS, read_smaller
 
 JPEG_QUALITY = 88
 
@@ -27,13 +25,6 @@ KEPT_BYTES = 64 * 2**20
 
 FORM = 1
 """Part of every ETag: one more when the same request is to give other bytes than before."""
-
-_REDUCED = {
-    8: cv2.IMREAD_REDUCED_COLOR_8,
-    4: cv2.IMREAD_REDUCED_COLOR_4,
-    2: cv2.IMREAD_REDUCED_COLOR_2,
-}
-"""How OpenCV decodes at an eighth, a quarter and a half of the size."""
 
 
 @dataclass(frozen=True)
@@ -134,7 +125,7 @@ def picture(request: PictureRequest) -> tuple[bytes, str]:
             f" {camera.height}; import the recording again",
         )
     factor = 1 if request.rectified or width is None else _reduction(width, header.width, crop)
-    image = read_image(request.path) if factor == 1 else _reduced(request.path, factor)
+    image = read_smaller(request.path, factor=factor)
     if request.rectified:
         image = rectify(image, camera)
     if crop is not None:
@@ -150,17 +141,5 @@ def _reduction(width: int, stored_width: int, crop: Crop | None) -> int:
     """How much smaller the image may be decoded for a picture of a width: 8, 4, 2 or 1. A crop must not begin or end
     within one of the smaller pixels, or the picture would be shifted by a part of one."""
     if crop is None:
-        return next((factor for factor in _REDUCED if stored_width >= factor * width), 1)
-    return next((f for f in _REDUCED if crop.width >= f * width and crop.is_of_blocks(f)), 1)
-
-
-def _reduced(path: Path, factor: int) -> UInt8[np.ndarray, "h w 3"]:
-    """The image decoded at a half, a quarter or an eighth of its size."""
-    try:
-        data = np.fromfile(path, dtype=np.uint8)
-        image = cv2.imdecode(data, _REDUCED[factor] | cv2.IMREAD_IGNORE_ORIENTATION)
-    except (OSError, cv2.error) as error:
-        raise BadFile(path, f"the image cannot be decoded: {error}") from error
-    if image is None:
-        raise BadFile(path, "the image cannot be decoded (damaged)")
-    return image
+        return next((factor for factor in REDUCTIONS if stored_width >= factor * width), 1)
+    return next((f for f in REDUCTIONS if crop.width >= f * width and crop.is_of_blocks(f)), 1)

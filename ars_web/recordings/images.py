@@ -9,13 +9,16 @@ from jaxtyping import UInt8
 from ars_web.errors import BadFile
 from ars_web.recordings.image_header import MAX_IMAGE_PIXELS, ImageHeader, read_header
 
-__all__ = ["MAX_IMAGE_PIXELS", "image_size", "read_image", "read_reduced"]
+__all__ = ["MAX_IMAGE_PIXELS", "REDUCTIONS", "image_size", "read_image", "read_reduced", "read_smaller"]
 
 _REDUCED = {
     2: cv2.IMREAD_REDUCED_COLOR_2,
     4: cv2.IMREAD_REDUCED_COLOR_4,
     8: cv2.IMREAD_REDUCED_COLOR_8,
 }
+
+REDUCTIONS = (8, 4, 2, 1)
+"""By which images can be decoded smaller, the quickest first."""
 
 
 def image_size(path: Path) -> tuple[int, int]:
@@ -52,12 +55,22 @@ def read_reduced(path: Path, *, width: int) -> UInt8[np.ndarray, "h w 3"]:
     of decoding all of it. An image that is no wider than `width` comes as it is.
     """
     header = _whole_header(path)
-    factor = next((factor for factor in (8, 4, 2) if header.width >= factor * width), None)
-    image = read_image(path) if factor is None else _decoded(path, _REDUCED[factor])
+    image = read_smaller(path, factor=next((f for f in REDUCTIONS if header.width >= f * width), 1))
     if width < image.shape[1]:
         height = max(1, round(header.height * width / header.width))
         image = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
     return image
+
+
+def read_smaller(path: Path, *, factor: int) -> UInt8[np.ndarray, "h w 3"]:
+    """The pixels as `read_image` gives them, each for a square of `factor` (one of REDUCTIONS) pixels of the image.
+
+    Squares are counted from the image's top left corner; those that its right and lower border cut are rounded up.
+    """
+    if factor == 1:
+        return read_image(path)
+    _whole_header(path)
+    return _decoded(path, _REDUCED[factor])
 
 
 def _whole_header(path: Path) -> ImageHeader:
