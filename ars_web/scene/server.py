@@ -207,7 +207,7 @@ class SceneServers:
     def _make(self, sid: str) -> "SessionScene":
         from ars_web.scene.session_scene import SessionScene
 
-        return SessionScene(self._store.snapshot(sid), read_state=lambda: self._store.state(sid), workers=self._workers)
+        return SessionScene(sid, store=self._store, editor=self._editor, workers=self._workers)
 
     def _forget(self, sid: str, entry: _Open) -> None:
         entry.closed = True

@@ -8,20 +8,26 @@ import logging
 from collections.abc import Callable
 from concurrent.futures import Executor
 from contextlib import suppress
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import viser
 
 from ars_web.errors import ArsError
+from ars_web.geometry.rigid_transform import Transform
 from ars_web.scene import hardening
 from ars_web.scene.boxes import BoxNodes
 from ars_web.scene.cameras import add_cameras
-from ars_web.scene.extent import FIELD_OF_VIEW, overview, recording_extent
+from ars_web.scene.extent import FIELD_OF_VIEW, recording_extent
 from ars_web.scene.ground import add_ground
+from ars_web.scene.photos import Photos
 from ars_web.scene.picking import Ray, pixel_angle
 from ars_web.scene.views import ClientView, Page, Surroundings
-from ars_web.sessions.model import SessionSnapshot, SessionState
-from ars_web.workspace import BoxPreview, Look, ViewAction, ViewState
+from ars_web.sessions.editing import SessionEditor
+from ars_web.sessions.model import VirtualBox
+from ars_web.sessions.store import SessionStore
+from ars_web.workspace import BoxPreview, Dragged, ViewAction, ViewEvent, ViewState
 
 log = logging.getLogger(__name__)
 
@@ -31,36 +37,42 @@ CLOSING_SECONDS = 5.0
 class SessionScene:
     """One session's scene, served on loopback from the moment it is made until `close`. Thread-safe."""
 
-    def __init__(
-        self, recording: SessionSnapshot, *, read_state: Callable[[], SessionState], workers: Executor
-    ) -> None:
+    def __init__(self, sid: str, *, store: SessionStore, editor: SessionEditor, workers: Executor) -> None:
         """
         Args:
-            read_state: the session as it is now; may block.
             workers: for what may block.
+
+        Raises:
+            NotFound: there is no such session.
         """
-        self._read_state = read_state
+        recording = store.snapshot(sid)
+        self._store = store
+        self._edits = editor
         self._workers = workers
         self._pages: dict[str, Page] = {}
         self._states: dict[str, ViewState] = {}
         self._clients: dict[int, ClientView] = {}
         self._refreshing: asyncio.Task[None] | None = None
         self._stale = False
+        self._closing = False
         self._revision = recording.state.revision
         self.server = hardening.guarded_server()
         extent = recording_extent(recording.frames.Ts_world_camera)
         boxes = BoxNodes(self.server)
-        self._around = Surroundings(recording=recording, extent=extent, boxes=boxes, workers=workers)
-        with self.server.atomic():
-            add_ground(self.server.scene, extent)
-            add_cameras(self.server.scene, recording.frames, recording.cameras, extent)
-        boxes.show(recording.state)
-        self._set_initial_camera()
-        self.server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
-        self.server.on_client_connect(self._connected)
-        self.server.on_client_disconnect(self._disconnected)
-        self.server.scene.on_click()(self._clicked)  # pyright: ignore[reportArgumentType] viser takes both kinds
+        self._around = Surroundings(
+            recording=recording,
+            extent=extent,
+            boxes=boxes,
+            photos=Photos(recording.cameras, recording.frames),
+            workers=workers,
+            tell=self._tell,
+        )
         self._loop = self.server.get_event_loop()
+        try:
+            self._furnish()
+        except BaseException:
+            self.server.stop()
+            raise
 
     @property
     def port(self) -> int:
@@ -106,18 +118,60 @@ class SessionScene:
         with suppress(RuntimeError):  # the loop has ended by itself
             asyncio.run_coroutine_threadsafe(self._end(), self._loop).result(CLOSING_SECONDS)
         self.server.stop()
+        self._around.photos.close()
+
+    def _furnish(self) -> None:
+        around, server = self._around, self.server
+        with server.atomic():
+            add_ground(server.scene, around.extent)
+            add_cameras(server.scene, around.recording.frames, around.recording.cameras, around.extent)
+        around.boxes.show(around.recording.state)
+        self._set_initial_camera()
+        server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
+        server.on_client_connect(self._connected)
+        server.on_client_disconnect(self._disconnected)
+        server.scene.on_click()(self._clicked)  # pyright: ignore[reportArgumentType] viser takes both kinds
+
+    def _set_initial_camera(self) -> None:
+        viewpoint, radius = self._around.overview(), self._around.extent.radius
+        camera = self.server.initial_camera
+        camera.position, camera.look_at = viewpoint.position, viewpoint.look_at
+        camera.fov = FIELD_OF_VIEW
+        camera.near = min(0.01, 0.002 * radius)
+        camera.far = max(1000.0, 200 * radius)
+
+    def _tell(self, name: str, event: ViewEvent) -> None:
+        """Tell a view's page of what happens there, and of drags all pages; by any thread."""
+        page = self._pages.get(name)
+        if page is not None:
+            page.send(event)
+        if isinstance(event, Dragged):
+            for other in list(self._pages.values()):
+                if other is not page:
+                    other.send(replace(event, own=False))
 
     def _post(self, callback: Callable[..., None], *args: object) -> None:
         with suppress(RuntimeError):  # the scene was closed meanwhile
             self._loop.call_soon_threadsafe(callback, *args)
 
+    def _commit(self, author: str, box_id: int, revision: int, T_world_box: Transform, size: np.ndarray) -> VirtualBox:
+        return self._edits.change_box(
+            self._around.recording.id,
+            box_id,
+            expected_revision=revision,
+            T_world_box=T_world_box,
+            size=size,
+            author=author,
+        )
+
     # What follows runs on the event loop.
 
     async def _connected(self, client: viser.ClientHandle) -> None:
+        if self._closing:
+            return
         hardening.hear_only_what_is_needed(client)
         visitor = hardening.visitor()
-        view = ClientView(client, visitor, self._around)
-        view.page = self._pages.get(visitor.view)
+        view = ClientView(client, visitor, self._around, commit=partial(self._commit, visitor.author))
         self._clients[client.client_id] = view
         state = self._states.get(visitor.view)
         if state is not None or not visitor.view:
@@ -133,15 +187,13 @@ class SessionScene:
 
     def _attach(self, page: Page) -> None:
         self._pages[page.view] = page
-        for view in self._views(page.view):
-            view.page = page
 
     def _detach(self, name: str) -> None:
+        for view in self._views(name):
+            view.cancel()
+        self._around.boxes.preview(None, by=name)
         self._pages.pop(name, None)
         self._states.pop(name, None)
-        self._around.boxes.preview(None, by=name)
-        for view in self._views(name):
-            view.page = None
 
     def _show(self, name: str, state: ViewState) -> None:
         self._states[name] = state
@@ -150,8 +202,7 @@ class SessionScene:
 
     def _act(self, name: str, action: ViewAction) -> None:
         for view in self._views(name):
-            if isinstance(action, Look):
-                view.look(action)
+            view.act(action)
 
     def _preview(self, name: str, preview: BoxPreview | None) -> None:
         self._around.boxes.preview(preview, by=name)
@@ -165,7 +216,8 @@ class SessionScene:
         try:
             while self._stale:
                 self._stale = False
-                state = await asyncio.get_running_loop().run_in_executor(self._workers, self._read_state)
+                loop = asyncio.get_running_loop()
+                state = await loop.run_in_executor(self._workers, self._store.state, self._around.recording.id)
                 self._around.boxes.show(state)
                 self._revision = state.revision
         except ArsError as error:  # deleted, or the disk is full: those who ask for the session are told
@@ -186,17 +238,8 @@ class SessionScene:
         )
         view.pick(ray)
 
-    def _set_initial_camera(self) -> None:
-        around = self._around
-        corners = [box.corners_world for box in around.boxes.drawn().values()]
-        viewpoint = overview(around.extent, np.concatenate(corners) if corners else np.zeros((0, 3)))
-        camera = self.server.initial_camera
-        camera.position, camera.look_at = viewpoint.position, viewpoint.look_at
-        camera.fov = FIELD_OF_VIEW
-        camera.near = min(0.01, 0.002 * around.extent.radius)
-        camera.far = max(1000.0, 200 * around.extent.radius)
-
     async def _end(self) -> None:
+        self._closing = True
         tasks = [task for view in self._clients.values() for task in view.close()]
         if self._refreshing is not None:
             self._refreshing.cancel()
