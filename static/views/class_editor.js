@@ -97,7 +97,7 @@ function UsualSize({ one, resize }) {
     const size = /** @type {Triple} */ (sides.map((side) => (side.ok ? side.value : NaN)));
     if (await resize(size)) drafts.value = [null, null, null];
   };
-  return html`<div class="line" role="group" aria-label="Usual size, mm"><span class="muted">Usual size mm</span>
+  return html`<div class="line" role="group" aria-label="Usual size, mm"><span class="muted">Size mm</span>
       <span class="sides">
         ${texts.map(
           (text, i) => html`<input

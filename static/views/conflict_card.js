@@ -5,11 +5,11 @@ import { anglesOfWxyz } from "../lib/rotation.js";
 import { html, useSignal } from "../lib/view.js";
 import * as store from "../store.js";
 
-const ROWS = [
-  ["Position mm", ["X", "Y", "Z"]],
-  ["Rotation °", ["R", "P", "Y"]],
-  ["Size mm", ["X", "Y", "Z"]],
-];
+const GROUPS = /** @type {const} */ ([
+  ["Position", "mm", "XYZ"],
+  ["Rotation", "°", "RPY"],
+  ["Size", "mm", "XYZ"],
+]);
 
 export function ConflictCard() {
   const conflict = store.conflict.value;
@@ -52,21 +52,25 @@ function Numbers({ yours, current }) {
   const mine = numbers(yours, theirs === null ? null : theirs[1]);
   const finely = theirs !== null && mine.every((row, i) => row.every((value, j) => fixed(value, 1) === fixed(theirs[i][j], 1)));
   const text = (/** @type {number} */ value) => fixed(value, finely ? 3 : 1);
+  const differs = (/** @type {number} */ i, /** @type {number} */ j) => theirs !== null && text(theirs[i][j]) !== text(mine[i][j]);
+  const shown = GROUPS.map((_, i) => i).filter((i) => theirs === null || [0, 1, 2].some((j) => differs(i, j)));
+  const same = GROUPS.filter((_, i) => !shown.includes(i)).map(([name], i) => (i === 0 ? name : name.toLowerCase()));
   return html`<table>
     <thead><tr><th scope="col"><span class="visually-hidden">Number</span></th>${theirs !== null && html`<th scope="col">Theirs</th>`}<th scope="col">Yours</th></tr></thead>
     <tbody>
-      ${ROWS.flatMap(([name, axes], i) =>
-        [...axes].map((axis, j) => {
-          const differs = theirs !== null && text(theirs[i][j]) !== text(mine[i][j]);
-          return html`<tr key=${`${name}${axis}`} data-differs=${differs}>
-            <th scope="row">${j === 0 ? name : html`<span class="visually-hidden">${name}</span>`} <span data-tone=${"xyz"[j]}>${axis}</span></th>
+      ${shown.flatMap((i) => {
+        const [name, unit, axes] = GROUPS[i];
+        return [...axes].map(
+          (axis, j) => html`<tr key=${`${name}${axis}`} data-differs=${differs(i, j)}>
+            <th scope="row">${j === 0 ? `${name} ${unit}` : html`<span class="visually-hidden">${name}</span>`} <span data-tone=${"xyz"[j]}>${axis}</span></th>
             ${theirs !== null && html`<td>${text(theirs[i][j])}</td>`}
-            <td>${differs ? html`<strong>${text(mine[i][j])}</strong><span class="visually-hidden">, differs</span>` : text(mine[i][j])}</td>
-          </tr>`;
-        }),
-      )}
+            <td>${differs(i, j) ? html`<strong>${text(mine[i][j])}</strong><span class="visually-hidden">, differs</span>` : text(mine[i][j])}</td>
+          </tr>`,
+        );
+      })}
     </tbody>
-  </table>`;
+  </table>
+  ${same.length > 0 && html`<p class="muted">${same.join(" and ")} ${same.length === 1 ? "is" : "are"} the same in both.</p>`}`;
 }
 
 /**

@@ -22,8 +22,8 @@ export function SidePanel() {
       <${Tabs} />
       ${shown === "boxes" && store.boxes.value.size > 0 && html`<${NewBox} />`}
     </div>
+    <${ConflictCard} />
     <div class="panel-body" role="tabpanel" id="panel-body" aria-labelledby=${`tab-${shown}`}>
-      <${ConflictCard} />
       ${shown === "boxes"
         ? html`<${BoxesList} /><${BoxNumbers} /><${TellingFrames} /><${Classes} /><${Facts} />`
         : html`<${HistoryPanel} />`}
