@@ -33,8 +33,8 @@ PATH_COLOR = (112, 128, 148)
 NEIGHBOUR_COLOR = (120, 190, 255)
 CURRENT_COLOR = (74, 168, 255)
 
-NODE = "/cameras"
-"""What holds all that is drawn of cameras; a view shadows it to hide them."""
+CAMERAS = "/cameras"
+"""The node that holds all that is shared of cameras."""
 
 _EDGES = np.array([(0, 1), (0, 2), (0, 3), (0, 4), (1, 2), (2, 3), (3, 4), (4, 1)])
 
@@ -110,9 +110,9 @@ def reduced_camera(camera: Camera, *, width: int, height: int) -> Camera:
 def add_cameras(scene: viser.SceneApi, frames: FrameTable, cameras: Mapping[int, Camera], extent: Extent) -> None:
     """Add what all views share: every camera's point and the path's frusta."""
     centres = frames.Ts_world_camera[:, :3, 3]
-    scene.add_frame(NODE, show_axes=False, position=extent.focus)
+    scene.add_frame(CAMERAS, show_axes=False, position=extent.focus)
     scene.add_point_cloud(
-        f"{NODE}/points",
+        f"{CAMERAS}/points",
         (centres - extent.focus).astype(np.float32),
         colors=PATH_COLOR,
         point_size=0.06 * extent.frustum_depth,
@@ -123,7 +123,7 @@ def add_cameras(scene: viser.SceneApi, frames: FrameTable, cameras: Mapping[int,
     path = thinned(centres, apart=0.5 * extent.frustum_depth, most=MOST_FRUSTA)
     lines = frustum_lines(frames, cameras, path, depth=extent.frustum_depth) - extent.focus
     scene.add_line_segments(
-        f"{NODE}/path", lines.astype(np.float32), colors=PATH_COLOR, thickness=1.0, thickness_units="screen"
+        f"{CAMERAS}/path", lines.astype(np.float32), colors=PATH_COLOR, thickness=1.0, thickness_units="screen"
     )
 
 
@@ -140,7 +140,6 @@ class CurrentCamera:
         self._neighbour_depth = extent.frustum_depth
         self._nodes: tuple[viser.FrameHandle, viser.LineSegmentsHandle, viser.LineSegmentsHandle] | None = None
         self._photo: viser.ImageHandle | None = None
-        self._hidden: viser.FrameHandle | None = None
 
     def show(self, frame: int, photo: UInt8[np.ndarray, "h w 3"] | None) -> None:
         """Make it this frame; None: its photo cannot be read, and only its frustum is drawn."""
@@ -188,13 +187,3 @@ class CurrentCamera:
         """Show it no more, until it is shown again."""
         if self._nodes is not None:
             self._nodes[0].visible = False
-
-    def show_others(self, visible: bool) -> None:
-        """Whether this view shows the points and the path that all views share."""
-        if self._hidden is None:
-            if visible:
-                return
-            self._hidden = self._client.scene.add_frame(NODE, show_axes=False, visible=False)
-        elif visible:
-            self._hidden.remove()
-            self._hidden = None

@@ -21,6 +21,13 @@ ASIDE = math.radians(38)
 path is seen from the side."""
 
 
+MARGIN = 1.15
+ASPECT = 1.3
+"""Width over height of the window that everything should fit; wider ones have room to spare."""
+
+CENTRINGS = 6
+
+
 @dataclass(frozen=True, eq=False)
 class Extent:
     """The size of a recording.
@@ -107,23 +114,21 @@ def _sight(height: float, downwards: float, spread: float) -> float:
     return min(max(height / math.sin(angle), near), 10 * near) if 0 < angle < math.pi / 2 and height > 0 else near
 
 
-def overview(extent: Extent, corners_world: Float[np.ndarray, "n 3"]) -> Viewpoint:
-    """A three-quarter view of the whole recording with its boxes, n corners, which may be none."""
-    return _three_quarter(extent, np.array(extent.focus), _reach(extent, corners_world))
-
-
-def _reach(extent: Extent, corners_world: Float[np.ndarray, "n 3"]) -> float:
-    if not len(corners_world):
-        return extent.radius
-    farthest = float(np.linalg.norm(corners_world - extent.focus, axis=1).max())
-    # A box that someone put far away by mistake must not make everything else a dot.
-    return max(extent.radius, min(farthest, 3 * extent.radius))
+def overview(
+    extent: Extent, centres_world: Float[np.ndarray, "n 3"], corners_world: Float[np.ndarray, "m 3"]
+) -> Viewpoint:
+    """A three-quarter view of the whole recording, n >= 1 cameras, with its boxes, m corners, which may be none."""
+    step = max(1, len(centres_world) // SAMPLES)
+    sampled = centres_world[::step]
+    # A camera or a box that is far away by mistake must not make everything else a dot.
+    points = np.concatenate([sampled, corners_world, extent.focus[None]])
+    return _three_quarter(extent, points[np.linalg.norm(points - extent.focus, axis=1) <= 3 * extent.radius])
 
 
 def close_up(extent: Extent, corners_world: Float[np.ndarray, "n 3"]) -> Viewpoint:
     """A three-quarter view of one thing with its surroundings."""
     middle = corners_world.mean(axis=0)
-    return _three_quarter(extent, middle, 2.0 * float(np.linalg.norm(corners_world - middle, axis=1).max()))
+    return _three_quarter(extent, np.concatenate([corners_world, middle + 2.0 * (corners_world - middle)]))
 
 
 def behind_camera(extent: Extent, T_world_camera: Float[np.ndarray, "4 4"]) -> Viewpoint:
@@ -134,9 +139,25 @@ def behind_camera(extent: Extent, T_world_camera: Float[np.ndarray, "4 4"]) -> V
     return Viewpoint(position=position, look_at=centre + 2.0 * extent.frustum_depth * forward)
 
 
-def _three_quarter(extent: Extent, target: Float[np.ndarray, "3"], reach: float) -> Viewpoint:
+def _three_quarter(extent: Extent, points: Float[np.ndarray, "n 3"]) -> Viewpoint:
+    """As near as all the points are seen, with a margin, in a window a little wider than high."""
     azimuth = extent.towards_cameras + ASIDE
-    outwards = np.array(
+    away = np.array(
         [math.cos(ELEVATION) * math.cos(azimuth), math.cos(ELEVATION) * math.sin(azimuth), math.sin(ELEVATION)]
     )
-    return Viewpoint(position=target + 1.05 * reach / math.sin(FIELD_OF_VIEW / 2) * outwards, look_at=target)
+    right = np.array([-math.sin(azimuth), math.cos(azimuth), 0.0])
+    axes = np.stack([right, np.cross(away, right), away])
+    half_height = math.tan(FIELD_OF_VIEW / 2) / MARGIN
+    slopes = np.array([ASPECT * half_height, half_height])
+    target = axes @ points.mean(axis=0)
+    seen = points @ axes.T
+    distance = 0.0
+    for _ in range(CENTRINGS):
+        around = seen - target
+        distance = float((np.abs(around[:, :2]) / slopes + around[:, 2:]).max())
+        # What is nearer looks larger: the middle of the picture is not that of the points.
+        shown = around[:, :2] / (distance - around[:, 2:])
+        target[:2] += (shown.min(axis=0) + shown.max(axis=0)) / 2 * distance
+    distance = max(distance, 4 * extent.frustum_depth)
+    look_at = target @ axes
+    return Viewpoint(position=look_at + distance * away, look_at=look_at)

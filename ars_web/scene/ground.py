@@ -15,6 +15,9 @@ from ars_web.scene.extent import Extent
 CELL_COLOR = (96, 106, 120)
 SECTION_COLOR = (118, 130, 146)
 
+GROUND = "/ground"
+AXES = "/axes"
+
 AXIS_COLORS = ((232, 72, 85), (79, 178, 92), (64, 132, 240))
 """X, Y, Z."""
 
@@ -28,22 +31,20 @@ def add_ground(scene: viser.SceneApi, extent: Extent) -> None:
     half = math.ceil(1.6 * extent.radius / (SECTION * cell)) * SECTION
     # Lines lie on whole cells of the world, so that they can be counted from its axes.
     x, y = np.round(extent.focus[:2] / (SECTION * cell)) * (SECTION * cell)
-    scene.add_frame("/ground", show_axes=False, position=(float(x), float(y), extent.ground))
+    scene.add_frame(GROUND, show_axes=False, position=(float(x), float(y), extent.ground))
     steps = np.arange(-half, half + 1)
     for name, chosen, color in (
         ("cells", steps % SECTION != 0, CELL_COLOR),
         ("sections", steps % SECTION == 0, SECTION_COLOR),
     ):
         lines = grid_lines(steps[chosen] * cell, half=half * cell)
-        scene.add_line_segments(f"/ground/{name}", lines, color, thickness=1.0, thickness_units="screen")
-    ends = np.eye(3, dtype=np.float32) * 2 * cell
-    scene.add_line_segments(
-        "/axes",
-        np.stack([np.zeros_like(ends), ends], axis=1),
-        colors=np.repeat(np.array(AXIS_COLORS, dtype=np.uint8)[:, None], 2, axis=1),
-        thickness=3.0,
-        thickness_units="screen",
-    )
+        scene.add_line_segments(f"{GROUND}/{name}", lines, color, thickness=1.0, thickness_units="screen")
+    scene.add_frame(AXES, show_axes=False)
+    for axis, color in enumerate(AXIS_COLORS):
+        line = np.stack([np.zeros(3), np.eye(3)[axis] * 2 * cell])[None]
+        scene.add_line_segments(
+            f"{AXES}/{'xyz'[axis]}", line.astype(np.float32), color, thickness=3.0, thickness_units="screen"
+        )
 
 
 def grid_lines(stations: Float[np.ndarray, "n"], *, half: float) -> Float[np.ndarray, "m 2 3"]:

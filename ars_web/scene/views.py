@@ -13,12 +13,14 @@ from jaxtyping import Float, UInt8
 from ars_web.errors import ArsError
 from ars_web.scene.box_editor import BoxEditor, Commit
 from ars_web.scene.boxes import BoxNodes, OwnBoxes
-from ars_web.scene.cameras import CurrentCamera, frustum_photo
+from ars_web.scene.cameras import CAMERAS, CurrentCamera, frustum_photo
 from ars_web.scene.extent import FIELD_OF_VIEW, Extent, Viewpoint, behind_camera, close_up, overview
 from ars_web.scene.frame_view import FrameView
+from ars_web.scene.ground import AXES, GROUND
 from ars_web.scene.hardening import Visitor, is_gone
 from ars_web.scene.photos import Photos
 from ars_web.scene.picking import Ray, box_hit, camera_hit
+from ars_web.scene.shared_nodes import SharedNodes
 from ars_web.sessions.model import SessionSnapshot
 from ars_web.workspace import Look, Picked, Refused, ViewAction, ViewEvent, ViewState
 
@@ -65,7 +67,7 @@ class Surroundings:
     def overview(self) -> Viewpoint:
         """Of the whole recording with its boxes as they are now."""
         corners = [box.corners_world for box in self.boxes.drawn().values()]
-        return overview(self.extent, np.concatenate(corners) if corners else np.zeros((0, 3)))
+        return overview(self.extent, self.centres, np.concatenate(corners) if corners else np.zeros((0, 3)))
 
 
 class ClientView:
@@ -84,6 +86,7 @@ class ClientView:
         self._closed = False
         recording = surroundings.recording
         self._camera = CurrentCamera(client, recording.frames, recording.cameras, surroundings.extent)
+        self._shared = SharedNodes(client, (CAMERAS, GROUND, AXES))
         self._boxes = OwnBoxes(client, surroundings.boxes)
         self._editor = BoxEditor(
             client,
@@ -120,7 +123,7 @@ class ClientView:
         except ArsError as error:
             self.tell(Refused(str(error)))
         with self.client.atomic():
-            self._camera.show_others(not in_frame)
+            self._shared.show(not in_frame)
             if in_frame:
                 self._camera.hide()
         self.client.flush()
