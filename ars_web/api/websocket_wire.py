@@ -1,11 +1,17 @@
 """uvicorn's websockets, hung up on where a peer makes the server keep what it never takes.
 
-What an application sends waits while the peer does not read. These three do not wait, and uvicorn bounds none of them:
-answers to pings, parts of a message that never ends, and the goodbye to a peer that is no longer there.
+What an application sends waits while the peer does not read. Three things do not wait, and uvicorn bounds none of them:
+answers to pings, parts of a message that never ends, and the goodbye to a peer that is no longer there. Nor does it
+answer what asks for a websocket in a way that none is asked for.
 """
+
+from typing import TYPE_CHECKING
 
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.frames import Frame
+
+if TYPE_CHECKING:
+    from uvicorn._types import ASGISendEvent
 
 MOST_UNREAD = 2**20
 """Bytes that wait for a peer which goes on pinging."""
@@ -16,6 +22,19 @@ MOST_PARTS = 1024
 
 class WebsocketWire(WebSocketsSansIOProtocol):
     """One websocket connection."""
+
+    def data_received(self, data: bytes) -> None:
+        """Take it in, unless it is not even a question for a websocket."""
+        super().data_received(data)
+        if self.conn.handshake_exc is not None and not self.handshake_initiated:
+            self.transport.abort()
+
+    async def send(self, message: "ASGISendEvent") -> None:
+        """Send; an application that has answered with a refusal has done all it could."""
+        await super().send(message)
+        if message["type"] == "websocket.http.response.body" and not message.get("more_body", False):
+            # Otherwise uvicorn logs an error for each stranger who is refused.
+            self.handshake_complete = True
 
     def handle_ping(self) -> None:
         """Answer, unless the answers before it were not read."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import httpx
 import pytest
-from websockets.exceptions import ConnectionClosed
+from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from ars_web.sessions.editing import SessionEditor
 from ars_web.sessions.store import SessionStore
@@ -28,7 +28,7 @@ def running(tmp_path: Path, served, write_scene, live_page):
             url = login.rpartition("/login")[0]
             headers = {"Authorization": f"Bearer {TOKEN}"}
             with httpx.Client(base_url=url, headers=headers, timeout=30) as client:
-                yield process, client, lambda sid, view, **options: live_page.line(url, sid, view, **options, **headers)
+                yield process, client, lambda sid, view, **more: live_page.line(url, sid, view, **{**headers, **more})
 
     return start
 
@@ -52,13 +52,15 @@ def test_a_server_that_stops_says_so_on_every_line(running, stop: signal.Signals
         with line(sid, A) as one, line(sid, B) as other:
             for page in (one, other):
                 page.next()
+            with pytest.raises(InvalidStatus, match="401"):
+                line(sid, A, Authorization="Bearer wrong").__enter__()
             process.send_signal(stop)
             for page in (one, other):
                 with pytest.raises(ConnectionClosed) as caught:
                     page.people(lambda people: False)
                 assert caught.value.rcvd.code == 1001
         _, said = process.communicate(timeout=20)
-        assert said == ""
+        assert said == "", "neither a stranger nor the end is an error of the server's"
 
 
 def test_a_page_comes_back_to_a_killed_server_and_misses_nothing(running, tmp_path: Path) -> None:

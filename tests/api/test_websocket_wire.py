@@ -5,6 +5,7 @@ import os
 import socket
 import struct
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from itertools import count
 from typing import Any
@@ -102,6 +103,20 @@ def test_without_that_the_server_takes_it_all(silent, monkeypatch, answer: str) 
     monkeypatch.setattr(WebsocketWire, "keepalive_timeout", lambda self: None)
     monkeypatch.delattr(WebsocketWire, answer)
     assert not ATTACKS[answer](silent)
+
+
+@pytest.mark.parametrize("request_line", ["POST / HTTP/1.1", "PUT / HTTP/1.1"])
+def test_what_asks_for_no_websocket_is_hung_up_on(server, request_line: str) -> None:
+    with socket.create_connection(("127.0.0.1", int(server.url.rpartition(":")[2])), timeout=20) as peer:
+        lines = [request_line, f"Host: {server.host}", "Connection: Upgrade", "Upgrade: websocket"]
+        peer.sendall("\r\n".join([*lines, "", ""]).encode())
+        with suppress(ConnectionResetError):
+            assert peer.recv(100) == b""
+
+
+def test_a_message_beyond_all_measure_ends_the_line(silent) -> None:
+    size = 2**20 + 1
+    assert hung_up_on(silent, [struct.pack("!BBQ4x", 0x81, 0x80 | 127, size), *[b"x" * 2**16] * 256])
 
 
 def test_a_peer_that_vanished_with_much_on_the_way_is_detached(server, silent, until) -> None:
