@@ -207,9 +207,8 @@ def main() -> None:
             limits = httpx.Limits(max_connections=CONNECTIONS, max_keepalive_connections=CONNECTIONS)
             headers = {"Authorization": f"Bearer {token}"}
             with httpx.Client(base_url=found[0], headers=headers, limits=limits, timeout=60) as client:
-                print(
-                    f"images of {demo.camera.width} x {demo.camera.height}; {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}"
-                )
+                busy = f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}"
+                print(f"images of {demo.camera.width} x {demo.camera.height}; {busy}")
                 thumbnails(client, short, options.thumbnails)
                 previews(client, short)
                 telling(client, long, options.frames)
