@@ -1,0 +1,381 @@
+/**
+ * Runs in viser's page and joins it to the page around it: tells it of keys, zoom and the pointer, and in frame mode
+ * locks the camera to the photo, zooms and pans without moving it, and fades the photo.
+ *
+ * What it says to the page around it, always to this origin:
+ *   {ars: "ready"}
+ *   {ars: "key", type: "keydown" | "keyup", key, code, ctrl, shift, alt, meta, repeat}
+ *   {ars: "zoom", zoom}                      1 where the whole photo shows
+ *   {ars: "pointer", x, y, buttons}          CSS pixels in the iframe, while a button is down and once when it is not
+ * What it hears, from the page around it alone:
+ *   {ars: "view", mode: "scene" | "frame", blend, dark}         blend: 0 no photo, 1 the photo as it is
+ *   {ars: "fit"}                                                zoom 1, as double-click and the key 0 do here
+ *
+ * A classic script, since it has to hear keys before viser's own, deferred one.
+ */
+(() => {
+  "use strict";
+
+  /**
+   * The parts that are used of `window.__viserMutable`, viser 1.1.1's handle for tests.
+   *
+   * @typedef {object} Vector
+   * @property {number} x
+   * @property {number} y
+   * @property {number} z
+   * @property {() => Vector} clone
+   * @property {(matrix: unknown) => Vector} setFromMatrixPosition
+   * @property {(matrix: unknown) => Vector} applyMatrix4
+   *
+   * @typedef {object} Camera three.js's PerspectiveCamera; `fov` is vertical, in degrees
+   * @property {number} fov
+   * @property {Vector} position
+   * @property {unknown} matrixWorldInverse
+   * @property {unknown} projectionMatrix
+   * @property {() => void} updateProjectionMatrix
+   * @property {(fullWidth: number, fullHeight: number, x: number, y: number, width: number, height: number) => void} setViewOffset
+   * @property {() => void} clearViewOffset
+   *
+   * @typedef {object} Material
+   * @property {number} opacity
+   * @property {boolean} colorWrite
+   * @property {boolean} depthWrite
+   *
+   * @typedef {object} Node
+   * @property {boolean} visible
+   * @property {Node | null} parent
+   * @property {Material} [material]
+   * @property {unknown} matrixWorld
+   * @property {{x: number, setScalar: (scale: number) => void}} scale
+   * @property {(callback: (node: Node) => void) => void} traverse
+   *
+   * @typedef {object} Controls
+   * @property {boolean} enabled
+   * @property {Record<string, number>} mouseButtons
+   * @property {Record<string, number>} touches
+   *
+   * @typedef {object} Viser
+   * @property {HTMLCanvasElement} canvas
+   * @property {Camera} camera
+   * @property {Controls} cameraControl
+   * @property {Record<string, Node | undefined>} nodeRefFromName
+   * @property {() => void} requestRender
+   */
+
+  const PARTS = ["canvas", "camera", "cameraControl", "nodeRefFromName", "requestRender"];
+  const PATIENCE = 30_000;
+  const LARGEST_ZOOM = 20;
+  const STILL = 4; // CSS pixels that a press may move and be a click
+  const PHOTO = "/photo"; // as in scene/frame_view.py
+  const HANDLES = "/edit/handle/"; // as in scene/face_handles.py
+  const BALL = 0.01; // their radius there, metres
+  const HANDLE_PIXELS = 11; // radius of what takes the press; the dot is smaller, see bridge.css
+
+  const view = { mode: "scene", blend: 1 };
+  /** Zoom, and the middle of what is seen, in tangents of the angles right of and below the optical axis. */
+  const window2d = { zoom: 1, x: 0, y: 0 };
+  /** The camera's own field of view, and what it was set to last here. */
+  const fov = { base: 0, set: 0 };
+  let offset = "";
+  /** @type {{controls: Controls, mouseButtons: Record<string, number>, touches: Record<string, number>} | null} */
+  let locked = null;
+  /** @type {{id: number, x: number, y: number, moving: boolean} | null} */
+  let pan = null;
+  let space = false;
+  /** @type {{x: number, y: number, buttons: number} | null} */
+  let pointer = null;
+
+  /** @param {object} message */
+  function tell(message) {
+    if (window.parent !== window) window.parent.postMessage(message, location.origin);
+  }
+
+  /** viser's parts, once all are there. @returns {Viser | null} */
+  function found() {
+    const parts = /** @type {any} */ (window).__viserMutable;
+    return parts && PARTS.every((part) => parts[part] != null) ? parts : null;
+  }
+
+  // ---------------------------------------------------------------- what the page wants
+
+  addEventListener("message", (event) => {
+    if (event.origin !== location.origin || event.source !== window.parent || window.parent === window) return;
+    const told = event.data;
+    if (told === null || typeof told !== "object") return;
+    if (told.ars === "fit") fit();
+    if (told.ars !== "view") return;
+    if (told.mode === "scene" || told.mode === "frame") view.mode = told.mode;
+    if (typeof told.blend === "number") view.blend = Math.min(1, Math.max(0, told.blend)) || 0;
+    if (typeof told.dark === "boolean") document.documentElement.classList.toggle("ars-light", !told.dark);
+  });
+
+  // ---------------------------------------------------------------- keys
+
+  /** What a browser does with these keys is not wanted: scroll, find, save, bookmark. */
+  const OURS_WITH_CONTROL = new Set(["z", "y", "k", "d", "s", "home", "end"]);
+
+  /** @param {KeyboardEvent} event */
+  function hearKey(event) {
+    const target = event.composedPath()[0];
+    if (target instanceof HTMLElement && (target.isContentEditable || /^(INPUT|TEXTAREA|SELECT)$/.test(target.tagName))) return;
+    if (["Shift", "Control", "Alt", "Meta"].includes(event.key)) return; // viser minds these itself
+    const { type, key, code, ctrlKey: ctrl, shiftKey: shift, altKey: alt, metaKey: meta, repeat } = event;
+    tell({ ars: "key", type, key, code, ctrl, shift, alt, meta, repeat });
+    // The page has other meanings for the keys by which viser moves its camera and opens its palette.
+    event.stopImmediatePropagation();
+    const plain = !ctrl && !alt && !meta;
+    if (plain ? !/^(Tab|F\d+)$/.test(key) : (ctrl || meta) && OURS_WITH_CONTROL.has(key.toLowerCase())) event.preventDefault();
+    if (code === "Space") space = type === "keydown";
+    if (type === "keydown" && plain && view.mode === "frame") zoomByKey(key);
+  }
+
+  /** @param {string} key */
+  function zoomByKey(key) {
+    const viser = found();
+    if (viser === null) return;
+    const { clientWidth, clientHeight } = viser.canvas;
+    if (key === "0") fit();
+    else if (key === "+" || key === "=") zoomAbout(viser, clientWidth / 2, clientHeight / 2, 1.25);
+    else if (key === "-") zoomAbout(viser, clientWidth / 2, clientHeight / 2, 0.8);
+  }
+
+  addEventListener("keydown", hearKey, true);
+  addEventListener("keyup", hearKey, true);
+  addEventListener("blur", () => (space = false));
+
+  // ---------------------------------------------------------------- zoom and pan
+
+  const half = () => Math.tan((fov.base * Math.PI) / 360);
+
+  function fit() {
+    Object.assign(window2d, { zoom: 1, x: 0, y: 0 });
+    tell({ ars: "zoom", zoom: 1 });
+  }
+
+  /**
+   * Zoom so that what is under a point of the canvas stays there.
+   * @param {Viser} viser @param {number} x @param {number} y @param {number} factor
+   */
+  function zoomAbout(viser, x, y, factor) {
+    const { clientWidth: width, clientHeight: height } = viser.canvas;
+    const before = (2 * half()) / window2d.zoom / height;
+    window2d.zoom = Math.min(LARGEST_ZOOM, Math.max(1, window2d.zoom * factor));
+    const after = (2 * half()) / window2d.zoom / height;
+    window2d.x += (x - width / 2) * (before - after);
+    window2d.y += (y - height / 2) * (before - after);
+    keepInside(width / height);
+    tell({ ars: "zoom", zoom: window2d.zoom });
+  }
+
+  /** @param {Viser} viser @param {number} dx @param {number} dy CSS pixels */
+  function panBy(viser, dx, dy) {
+    const { clientWidth: width, clientHeight: height } = viser.canvas;
+    const tangent = (2 * half()) / window2d.zoom / height;
+    window2d.x -= dx * tangent;
+    window2d.y -= dy * tangent;
+    keepInside(width / height);
+  }
+
+  /** Show nothing beyond what shows at zoom 1. @param {number} aspect */
+  function keepInside(aspect) {
+    const down = half() * (1 - 1 / window2d.zoom);
+    window2d.x = Math.min(down * aspect, Math.max(-down * aspect, window2d.x));
+    window2d.y = Math.min(down, Math.max(-down, window2d.y));
+  }
+
+  addEventListener(
+    "wheel",
+    (event) => {
+      const viser = found();
+      if (view.mode !== "frame" || viser === null) return;
+      event.preventDefault();
+      event.stopImmediatePropagation();
+      const lines = event.deltaMode === 1 ? 33 : event.deltaMode === 2 ? 400 : 1;
+      const bounds = viser.canvas.getBoundingClientRect();
+      // A pinch comes as a wheel with Control, in smaller steps.
+      const steps = Math.min(400, Math.max(-400, event.deltaY * lines)) * (event.ctrlKey ? 5 : 1);
+      zoomAbout(viser, event.clientX - bounds.x, event.clientY - bounds.y, Math.exp(-steps * 0.0018));
+    },
+    { capture: true, passive: false },
+  );
+
+  addEventListener(
+    "pointerdown",
+    (event) => {
+      if (view.mode !== "frame" || pan !== null || event.button > 2) return;
+      if (!(space && event.button === 0) && event.button === 0) return; // viser first: a handle, an arrow, a click
+      beginPan(event);
+      event.stopImmediatePropagation();
+      event.preventDefault();
+    },
+    true,
+  );
+
+  addEventListener("pointerdown", (event) => {
+    const viser = found();
+    if (view.mode !== "frame" || viser === null || pan !== null || event.button !== 0) return;
+    // Handles disable the camera's controls as they are pressed, arrows and rings take the pointer for themselves.
+    if (viser.cameraControl.enabled && !viser.canvas.hasPointerCapture(event.pointerId)) beginPan(event);
+  });
+
+  /** @param {PointerEvent} event */
+  function beginPan(event) {
+    pan = { id: event.pointerId, x: event.clientX, y: event.clientY, moving: event.button !== 0 };
+  }
+
+  addEventListener(
+    "pointermove",
+    (event) => {
+      if (event.buttons !== 0) pointer = { x: event.clientX, y: event.clientY, buttons: event.buttons };
+      const viser = found();
+      if (pan === null || viser === null || event.pointerId !== pan.id) return;
+      const [dx, dy] = [event.clientX - pan.x, event.clientY - pan.y];
+      if (!pan.moving && Math.hypot(dx, dy) < STILL) return;
+      pan = { ...pan, x: event.clientX, y: event.clientY, moving: true };
+      panBy(viser, dx, dy);
+    },
+    true,
+  );
+
+  /** @param {PointerEvent} event */
+  function endPan(event) {
+    if (pan?.id === event.pointerId) pan = null;
+    pointer = { x: event.clientX, y: event.clientY, buttons: event.buttons };
+  }
+  addEventListener("pointerup", endPan, true);
+  addEventListener("pointercancel", endPan, true);
+  addEventListener("contextmenu", (event) => view.mode === "frame" && event.preventDefault(), true);
+  addEventListener("dblclick", () => view.mode === "frame" && fit(), true);
+
+  // ---------------------------------------------------------------- each frame of the screen
+
+  /** @param {Viser} viser */
+  function lock(viser) {
+    const controls = viser.cameraControl;
+    if (view.mode === "frame" && locked?.controls !== controls) {
+      unlock();
+      locked = { controls, mouseButtons: { ...controls.mouseButtons }, touches: { ...controls.touches } };
+      for (const button of Object.keys(controls.mouseButtons)) controls.mouseButtons[button] = 0;
+      for (const touch of Object.keys(controls.touches)) controls.touches[touch] = 0;
+    } else if (view.mode === "scene" && locked !== null) {
+      unlock();
+      fit();
+    }
+  }
+
+  function unlock() {
+    if (locked === null) return;
+    Object.assign(locked.controls.mouseButtons, locked.mouseButtons);
+    Object.assign(locked.controls.touches, locked.touches);
+    locked = null;
+  }
+
+  /**
+   * Narrow the view to what is zoomed to. The field of view is narrowed and the window on it shifted, rather than a
+   * part of it cut out, so that what has a size on the screen keeps it: names, the gizmo, dots.
+   * @param {Viser} viser
+   */
+  function aim(viser) {
+    const { camera, canvas } = viser;
+    if (camera.fov !== fov.set) fov.base = camera.fov; // the server has set another one
+    const { clientWidth: width, clientHeight: height } = canvas;
+    if (width === 0 || height === 0) return;
+    keepInside(width / height);
+    const tangent = half() / window2d.zoom;
+    const wanted = window2d.zoom === 1 ? fov.base : (Math.atan(tangent) * 360) / Math.PI;
+    const pixels = height / (2 * tangent);
+    const next = window2d.zoom === 1 ? "" : [width, height, window2d.x * pixels, window2d.y * pixels].join();
+    if (camera.fov === wanted && next === offset) return;
+    fov.set = camera.fov = wanted;
+    if (next === "") camera.clearViewOffset();
+    else camera.setViewOffset(width, height, window2d.x * pixels, window2d.y * pixels, width, height);
+    offset = next;
+    camera.updateProjectionMatrix();
+    viser.requestRender();
+  }
+
+  /** @param {Viser} viser */
+  function fade(viser) {
+    viser.nodeRefFromName[PHOTO]?.traverse(({ material }) => {
+      if (material === undefined || material.opacity === view.blend) return;
+      material.opacity = view.blend;
+      viser.requestRender();
+    });
+  }
+
+  /** @type {Map<string, HTMLElement>} */
+  const dots = new Map();
+
+  /** Give the handles their size, and each a dot over everything. @param {Viser} viser */
+  function dress(viser) {
+    const { camera, canvas } = viser;
+    const bounds = canvas.getBoundingClientRect();
+    for (const [name, node] of Object.entries(viser.nodeRefFromName)) {
+      if (!name.startsWith(HANDLES) || node === undefined) continue;
+      const eye = camera.position.clone().setFromMatrixPosition(node.matrixWorld).applyMatrix4(camera.matrixWorldInverse);
+      const depth = -eye.z;
+      const shown = depth > 0 && isVisible(node);
+      const dot = dots.get(name) ?? addDot(name);
+      if (dot.hidden === shown) dot.hidden = !shown;
+      if (!shown) continue;
+      const scale = (HANDLE_PIXELS * depth * 2 * Math.tan((camera.fov * Math.PI) / 360)) / bounds.height / BALL;
+      if (Math.abs(node.scale.x - scale) > 1e-3 * scale) {
+        node.scale.setScalar(scale);
+        viser.requestRender();
+      }
+      node.traverse(({ material }) => {
+        if (material !== undefined) material.colorWrite = material.depthWrite = false; // the dot is what one sees
+      });
+      const at = eye.applyMatrix4(camera.projectionMatrix);
+      dot.style.left = `${bounds.x + ((at.x + 1) / 2) * bounds.width}px`;
+      dot.style.top = `${bounds.y + ((1 - at.y) / 2) * bounds.height}px`;
+    }
+  }
+
+  /** @param {Node} node */
+  function isVisible(node) {
+    for (let each = /** @type {Node | null} */ (node); each !== null; each = each.parent) if (!each.visible) return false;
+    return true;
+  }
+
+  /** @param {string} name */
+  function addDot(name) {
+    const dot = document.createElement("div");
+    dot.className = "ars-dot";
+    dot.hidden = true;
+    document.body.append(dot);
+    dots.set(name, dot);
+    return dot;
+  }
+
+  const begun = performance.now();
+  let announced = false;
+  let complained = false;
+
+  function eachFrame() {
+    requestAnimationFrame(eachFrame);
+    const viser = found();
+    if (viser === null) {
+      if (!announced && !complained && performance.now() - begun > PATIENCE) {
+        complained = true;
+        const there = /** @type {any} */ (window).__viserMutable ?? {};
+        const missing = PARTS.filter((part) => there[part] == null).join(", ");
+        console.error(`ARS Web: this is not viser 1.1.1, or WebGL is off: window.__viserMutable lacks ${missing}`);
+      }
+      return;
+    }
+    lock(viser);
+    aim(viser);
+    fade(viser);
+    dress(viser);
+    if (pointer !== null) {
+      tell({ ars: "pointer", ...pointer });
+      pointer = null;
+    }
+    if (!announced) {
+      announced = true;
+      tell({ ars: "ready" });
+    }
+  }
+  requestAnimationFrame(eachFrame);
+})();
