@@ -29,6 +29,7 @@ export function useScrollPlace(ref) {
     const element = ref.current;
     if (element === null) return;
     let refresh = 0;
+    let rest = 0;
     let timer = 0;
 
     /** @param {boolean} resting */
@@ -43,7 +44,9 @@ export function useScrollPlace(ref) {
 
     function scrolled() {
       clearTimeout(timer);
-      timer = setTimeout(() => read(true), REST);
+      cancelAnimationFrame(rest);
+      // The refresh after the pause tells whether it was one, or only a page too busy to scroll.
+      timer = setTimeout(() => (rest = requestAnimationFrame(() => read(true))), REST);
       if (refresh !== 0) return;
       refresh = requestAnimationFrame((now) => {
         refresh = 0;
@@ -65,6 +68,7 @@ export function useScrollPlace(ref) {
       element.removeEventListener("scroll", scrolled);
       clearTimeout(timer);
       cancelAnimationFrame(refresh);
+      cancelAnimationFrame(rest);
     };
   }, [ref]);
 

@@ -2,10 +2,20 @@
 
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
+import httpx
 import pytest
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Browser, Page, Route, sync_playwright
+
+from ars_web.demo.truth import DemoTruth
+from ars_web.recordings.recording import RecordedBox
+from ars_web.recordings.registry import read_recording
+from ars_web.sessions.store import SessionStore
 
 FLAGS = [
     "--no-sandbox",
@@ -32,3 +42,69 @@ def browser() -> Iterator[Browser]:
         )
         yield launched
         launched.close()
+
+
+@dataclass(frozen=True)
+class Workspace:
+    """A session's page, and its server asked directly.
+
+    Attributes:
+        complaints: errors and warnings of the page; who expects some takes them out.
+    """
+
+    page: Page
+    client: httpx.Client
+    sid: str
+    complaints: list[str]
+
+    def answer(self, path: str) -> Any:
+        """What the server says of the session."""
+        answer = self.client.get(f"/api/sessions/{self.sid}{path}")
+        assert answer.status_code == 200, answer.text
+        return answer.json()
+
+
+OpenFlatly = Callable[..., AbstractContextManager[Workspace]]
+
+
+@pytest.fixture
+def boxed_session(tmp_path: Path, demo_recording: DemoTruth) -> tuple[Path, str]:
+    """The sessions folder and the id of the small demo, boxed as the truth has it."""
+    boxes = tuple(RecordedBox(thing.class_name, thing.box) for thing in demo_recording.objects)
+    read = read_recording(demo_recording.folder, format="ars")
+    with SessionStore(tmp_path / "sessions") as store:
+        made = store.create(replace(read, class_names=demo_recording.class_names, boxes=boxes), name="demo")
+    return tmp_path / "sessions", made.id
+
+
+@pytest.fixture
+def open_flatly(served, browser: Browser) -> OpenFlatly:
+    """`with open_flatly(sessions, sid, **context) as workspace`: a session's page by a server of its own, without its
+    3D scene, which would take most of the machine where it is drawn in software. Nothing is complained about."""
+
+    @contextmanager
+    def opened(sessions: Path, sid: str, **options: Any) -> Iterator[Workspace]:
+        token = "token-of-the-browser-test"
+        with served(sessions, "--token", token) as (_, login):
+            base = login.partition("/login")[0]
+            headers = {"Authorization": f"Bearer {token}"}
+            context = browser.new_context(**{"viewport": {"width": 1280, "height": 720}, **options})
+            context.route("**/scene/**", _empty)
+            context.add_init_script("localStorage.setItem('ars-web.hints-seen', '1')")
+            assert context.request.post(f"{base}/login", data={"token": token}).ok
+            page = context.new_page()
+            complaints: list[str] = []
+            page.on("pageerror", lambda error: complaints.append(str(error)))
+            page.on("console", lambda told: complaints.append(told.text) if told.type in ("error", "warning") else None)
+            page.goto(f"{base}/sessions/{sid}")
+            page.get_by_role("slider", name="Frame", exact=True).wait_for()
+            with httpx.Client(base_url=base, headers=headers, timeout=60) as client:
+                yield Workspace(page, client, sid, complaints)
+            context.close()
+        assert complaints == []
+
+    return opened
+
+
+def _empty(route: Route) -> None:
+    route.fulfill(body="", content_type="text/html")
