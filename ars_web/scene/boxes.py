@@ -69,16 +69,21 @@ class BoxNodes:
         self._watchers: list[Watcher] = []
 
     def show(self, state: SessionState) -> None:
-        """Draw the boxes of a state; a box that is being previewed stays where the preview has it."""
+        """Draw the boxes of a state; a box that is being previewed stays where the preview has it.
+
+        A state that was read before a drag was stored does not take that back.
+        """
         with self.lock:
+            newer = {box_id: box for box_id, box in self._boxes.items() if box.revision > state.revision}
+            boxes = {**state.boxes, **newer}
             changed = {
                 box_id
-                for box_id in self._boxes.keys() | state.boxes.keys()
-                if _differs(self._boxes.get(box_id), state.boxes.get(box_id))
+                for box_id in self._boxes.keys() | boxes.keys()
+                if _differs(self._boxes.get(box_id), boxes.get(box_id))
             }
             recoloured = {c.id for c in state.classes.values() if c != self._classes.get(c.id)}
-            changed |= {box.id for box in state.boxes.values() if box.class_id in recoloured}
-            self._boxes, self._classes = dict(state.boxes), dict(state.classes)
+            changed |= {box.id for box in boxes.values() if box.class_id in recoloured}
+            self._boxes, self._classes = boxes, dict(state.classes)
             self._draw(changed)
 
     def preview(self, preview: BoxPreview | None, *, by: str = "") -> None:

@@ -14,7 +14,7 @@ from functools import partial
 import numpy as np
 import viser
 
-from ars_web.errors import ArsError
+from ars_web.errors import ArsError, NotFound
 from ars_web.geometry.rigid_transform import Transform
 from ars_web.scene import hardening
 from ars_web.scene.boxes import BoxNodes
@@ -23,11 +23,12 @@ from ars_web.scene.extent import FIELD_OF_VIEW, recording_extent
 from ars_web.scene.ground import add_ground
 from ars_web.scene.photos import Photos
 from ars_web.scene.picking import Ray, pixel_angle
+from ars_web.scene.placing import Sight, placed, usual_size
 from ars_web.scene.views import ClientView, Page, Surroundings
 from ars_web.sessions.editing import SessionEditor
 from ars_web.sessions.model import VirtualBox
 from ars_web.sessions.store import SessionStore
-from ars_web.workspace import BoxPreview, Dragged, ViewAction, ViewEvent, ViewState
+from ars_web.workspace import BoxPreview, Dragged, NewBox, Picked, Refused, ViewAction, ViewEvent, ViewState
 
 log = logging.getLogger(__name__)
 
@@ -164,6 +165,23 @@ class SessionScene:
             author=author,
         )
 
+    def _add_box(self, view: ClientView, sight: Sight, class_id: int) -> None:
+        """Add a box where the view looks, and let its page select it; on a worker."""
+        around, sid = self._around, self._around.recording.id
+        try:
+            state = self._store.state(sid)
+            known = state.classes.get(class_id)
+            if known is None:
+                raise NotFound(f"there is no class {class_id}; choose another one for the new box")
+            size = usual_size(known, state.boxes.values(), extent=around.extent)
+            box = placed(sight, size=size, ground=around.extent.ground)
+            added = self._edits.add_box(sid, class_id=class_id, box=box, author=view.visitor.author)
+        except ArsError as error:
+            view.tell(Refused(str(error)))
+            return
+        around.boxes.settle(added)
+        view.tell(Picked(box_id=added.id))
+
     # What follows runs on the event loop.
 
     async def _connected(self, client: viser.ClientHandle) -> None:
@@ -201,7 +219,14 @@ class SessionScene:
             view.show(state)
 
     def _act(self, name: str, action: ViewAction) -> None:
-        for view in self._views(name):
+        views = self._views(name)
+        if isinstance(action, NewBox):
+            # Once, however many browsers show the view; a page that closes may still be one of them.
+            if views and not hardening.is_gone(views[-1].client):
+                view = views[-1]
+                self._workers.submit(self._add_box, view, view.sight(), action.class_id)
+            return
+        for view in views:
             view.act(action)
 
     def _preview(self, name: str, preview: BoxPreview | None) -> None:
@@ -230,13 +255,10 @@ class SessionScene:
         if view is None:
             return
         camera = event.client.camera
-        direction = np.array(event.ray_direction)
-        ray = Ray(
-            origin=np.array(event.ray_origin),
-            direction=direction / np.linalg.norm(direction),
-            pixel_angle=pixel_angle(camera.fov, camera.image_height),
-        )
-        view.pick(ray)
+        origin, direction = np.array(event.ray_origin, dtype=float), np.array(event.ray_direction, dtype=float)
+        length, angle = float(np.linalg.norm(direction)), pixel_angle(camera.fov, camera.image_height)
+        if np.isfinite(origin).all() and np.isfinite([length, angle]).all() and length > 0:
+            view.pick(Ray(origin=origin, direction=direction / length, pixel_angle=angle))
 
     async def _end(self) -> None:
         self._closing = True

@@ -20,6 +20,7 @@ from ars_web.scene.ground import AXES, GROUND
 from ars_web.scene.hardening import Visitor, is_gone
 from ars_web.scene.photos import Photos
 from ars_web.scene.picking import Ray, box_hit, camera_hit
+from ars_web.scene.placing import Sight, frame_sight, free_sight
 from ars_web.scene.shared_nodes import SharedNodes
 from ars_web.sessions.model import SessionSnapshot
 from ars_web.workspace import Look, Picked, Refused, ViewAction, ViewEvent, ViewState
@@ -136,6 +137,17 @@ class ClientView:
             return
         if isinstance(action, Look):
             self._look(action)
+
+    def sight(self) -> Sight:
+        """What this view looks along."""
+        state, recording = self._state, self._around.recording
+        if state.mode == "frame" and 0 <= state.frame < len(recording.frames):
+            camera = recording.cameras[int(recording.frames.camera_ids[state.frame])]
+            T_world_camera = recording.frames.Ts_world_camera[state.frame]
+            boxes = self._around.boxes.drawn().values()
+            return frame_sight(camera, T_world_camera, boxes=boxes, extent=self._around.extent)
+        free = self.client.camera
+        return free_sight(np.array(free.position), np.array(free.look_at))
 
     def pick(self, ray: Ray) -> None:
         """Tell the page what a click's ray meets first of what this view shows."""
