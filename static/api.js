@@ -198,10 +198,10 @@ export async function imageProblem(sid, index) {
 
 // Exports.
 
-/** @returns {Promise<Schemas["FormatsAnswer"]>} */
+/** @returns {Promise<Schemas["FormatsJson"]>} */
 export const formats = () => request("GET", "/api/formats");
 
-/** @param {string} sid @param {string} format @param {object} options @param {AbortSignal} [signal] @returns {Promise<Schemas["ExportPreview"]>} */
+/** @param {string} sid @param {string} format @param {object} options @param {AbortSignal} [signal] @returns {Promise<Schemas["Forecast"]>} */
 export const previewExport = (sid, format, options, signal) =>
   request("POST", under(sid, "/exports/preview"), { body: { format, options }, signal });
 

@@ -159,8 +159,8 @@ export function setProblem(place, text) {
  * @property {() => Promise<Camera[]>} cameras
  * @property {(index: number) => Promise<Camera>} cameraOf a frame
  *
- * @property {() => Promise<Schemas["FormatsAnswer"]>} formats
- * @property {(format: string, options: object, signal?: AbortSignal) => Promise<Schemas["ExportPreview"]>} previewExport
+ * @property {() => Promise<Schemas["FormatsJson"]>} formats
+ * @property {(format: string, options: object, signal?: AbortSignal) => Promise<Schemas["Forecast"]>} previewExport
  * @property {(format: string, options: object) => Promise<Export>} startExport
  * @property {() => Promise<Export[]>} exports
  * @property {(id: string) => Promise<Export>} exportState
