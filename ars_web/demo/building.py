@@ -1,8 +1,11 @@
 """From the scene to its arrays: pictures drawn and halved, light baked, shapes placed."""
 
 import math
+import os
+import signal
 from collections.abc import Callable, Sequence
-from concurrent.futures import Executor
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
 
 import numpy as np
 from jaxtyping import Float, Shaped, UInt8
@@ -79,21 +82,42 @@ def build_world(things: Sequence[Thing], *, desk: Thing, executor: Executor) -> 
 def lit_world(things: Sequence[Thing], *, desk: Thing, executor: Executor, meanwhile: Callable[[World], None]) -> World:
     """The scene as arrays with the light worked out on every surface.
 
-    `meanwhile` is called with the world while the executor's threads are at it, once their code is compiled.
+    `meanwhile` is called with the world while another process is at it.
     """
-    world = build_world(things, desk=desk, executor=executor)
-    bake_rows(world, 0, 0, 0, 0)  # compiled here, before many threads want it
-    jobs = [
-        executor.submit(bake_rows, world, index, surface, first, min(first + BAKED_ROWS, rows))
-        for index, part in enumerate(world.parts)
-        for surface in range(shapes.SURFACE_COUNTS[part["kind"]])
-        for rows in [int(world.surfaces["light_grid"][part["first_surface"] + surface, 1])]
-        for first in range(0, rows, BAKED_ROWS)
-    ]
-    meanwhile(world)
-    for job in jobs:
-        job.result()
+    # Another process, since in this one numba compiles one thing after the other, and that is half the time of a
+    # first run. Spawned, never forked: numba's and OpenCV's threads do not survive a fork.
+    with ProcessPoolExecutor(
+        max_workers=1,
+        mp_context=get_context("spawn"),
+        initializer=signal.signal,
+        initargs=(signal.SIGINT, signal.SIG_IGN),  # Ctrl-C is this process's to answer
+    ) as baker:
+        baker.submit(_loaded)  # it loads what it needs while the pictures are drawn
+        world = build_world(things, desk=desk, executor=executor)
+        lights = baker.submit(_baked, world)
+        meanwhile(world)
+        world.lights[:] = lights.result()
     return world
+
+
+def _loaded() -> None:
+    """That a process has this module, and with it numba."""
+
+
+def _baked(world: World) -> Float[np.ndarray, "m 5"]:
+    """The light on every surface, worked out by a thread a core."""
+    bake_rows(world, 0, 0, 0, 0)  # compiled here, before many threads want it
+    with ThreadPoolExecutor(os.cpu_count()) as executor:
+        jobs = [
+            executor.submit(bake_rows, world, index, surface, first, min(first + BAKED_ROWS, rows))
+            for index, part in enumerate(world.parts)
+            for surface in range(shapes.SURFACE_COUNTS[part["kind"]])
+            for rows in [int(world.surfaces["light_grid"][part["first_surface"] + surface, 1])]
+            for first in range(0, rows, BAKED_ROWS)
+        ]
+        for job in jobs:
+            job.result()
+    return world.lights
 
 
 def _middle_world(thing: Thing, part: scene.Part) -> Float[np.ndarray, "3"]:
