@@ -9,11 +9,13 @@ export class ApiError extends Error {
    * @param {string} message
    * @param {number} status the HTTP status; 0: the server did not answer
    * @param {unknown} [current] of a conflict: the thing as it is now
+   * @param {readonly Schemas["FieldProblem"][]} [errors] of a request that does not fit: which parts of it, and why
    */
-  constructor(message, status, current = undefined) {
+  constructor(message, status, current = undefined, errors = []) {
     super(message);
     this.status = status;
     this.current = current;
+    this.errors = errors;
   }
 }
 
@@ -55,16 +57,16 @@ export const roots = () => request("GET", "/api/roots");
 /** @param {string} root @param {string} path @returns {Promise<Schemas["FoldersJson"]>} */
 export const folders = (root, path) => request("GET", `/api/roots/${encodeURIComponent(root)}/folders?${query({ path })}`);
 
-/** @param {object} source {root, path, format?} or {upload, format?} @returns {Promise<Schemas["LookJson"]>} */
+/** @param {import("./store.js").Source} source @returns {Promise<Schemas["LookJson"]>} */
 export const lookAtRecording = (source) => request("POST", "/api/imports/look", { body: source });
 
 /**
  * The address of a frame's picture before it is imported.
- * @param {object} source as for lookAtRecording
- * @param {number} index
+ * @param {string} look
+ * @param {number} frame
  * @param {number} width
  */
-export const lookImageAddress = (source, index, width) => `/api/imports/look/image?${query({ ...source, index, width })}`;
+export const lookImageAddress = (look, frame, width) => `/api/imports/look/image?${query({ look, frame, width })}`;
 
 /** @param {object} draft @returns {Promise<Schemas["ImportJson"]>} */
 export const startImport = (draft) => request("POST", "/api/imports", { body: draft, key: true });
@@ -290,7 +292,7 @@ async function request(method, address, { body, revision, key, signal, parsed = 
 
 /** @param {number} status @param {any} problem */
 function failure(status, problem) {
-  return new ApiError(problem?.detail ?? `The server answered ${status}.`, status, problem?.current);
+  return new ApiError(problem?.detail ?? `The server answered ${status}.`, status, problem?.current, problem?.errors);
 }
 
 /** 32 hex digits; not crypto.randomUUID, which plain http on a lab's network does not have. */
