@@ -76,6 +76,7 @@ Object.assign(
     renameOf: (session, name) => api.renameSession(session.id, session.revision, name),
     deleteSession: (session) => api.deleteSession(session.id, session.revision),
     restoreSession: api.restoreSession,
+    skipped: api.skipped,
     thumbnailAddress: (id, index, width) => api.imageAddress(id, index, { width }),
     roots: api.roots,
     folders: api.folders,

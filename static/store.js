@@ -23,6 +23,11 @@ import { computed, signal } from "./lib/view.js";
  * @property {[number, number, number]} size metres
  */
 
+/**
+ * A recording that may become a session: below a declared root, or in an upload; paths are relative to it.
+ * @typedef {{root?: string, upload?: string, path: string, format: string, images?: string, camera?: string}} Source
+ */
+
 /** @typedef {"scene" | "frame" | "export"} Mode */
 /** @typedef {"select" | "move" | "rotate" | "resize" | "points"} Tool */
 
@@ -172,13 +177,14 @@ export function setProblem(place, text) {
  * @property {(session: Session, name: string) => Promise<Session>} renameOf
  * @property {(session: Session) => Promise<void>} deleteSession
  * @property {(id: string) => Promise<Session>} restoreSession
+ * @property {(id: string) => Promise<Schemas["SkippedFrameJson"][]>} skipped frames that a session's recording lists and that could not be used
  * @property {(id: string, index: number, width: number) => string} thumbnailAddress of a session's frame
  * @property {() => Promise<Schemas["RootJson"][]>} roots
  * @property {(root: string, path: string) => Promise<Schemas["FoldersJson"]>} folders
- * @property {(source: object) => Promise<Schemas["LookJson"]>} lookAtRecording
- * @property {(source: object, index: number, width: number) => string} lookImageAddress
+ * @property {(source: Source) => Promise<Schemas["LookJson"]>} lookAtRecording
+ * @property {(look: string, frame: number, width: number) => string} lookImageAddress of one of a look's sample frames
  * @property {(file: File, onProgress: (sent: number, total: number) => void, signal?: AbortSignal) => Promise<Schemas["UploadJson"]>} upload
- * @property {(draft: object) => Promise<Schemas["ImportJson"]>} startImport
+ * @property {(draft: Source & {name: string, classes: string[]}) => Promise<Schemas["ImportJson"]>} startImport
  * @property {(id: string) => Promise<Schemas["ImportJson"]>} importState
  * @property {(id: string) => Promise<Schemas["ImportJson"]>} cancelImport
  * @property {() => Promise<Schemas["HealthJson"]>} health
