@@ -175,8 +175,8 @@ export const locatePoint = (sid, observations) => request("POST", under(sid, "/p
  * @param {string} sid @param {{frame: number, x: number, y: number}} of @param {number} frame
  * @returns {Promise<Schemas["EpipolarAnswer"]>}
  */
-export const epipolar = async (sid, of, frame) =>
-  (await request("GET", under(sid, `/frames/${frame}/epipolar?${query({ of: of.frame, x: of.x, y: of.y })}`))).lines;
+export const epipolar = (sid, of, frame) =>
+  request("GET", under(sid, `/frames/${frame}/epipolar?${query({ of: of.frame, x: of.x, y: of.y })}`));
 
 /**
  * The address of a frame's image: at most `width` pixels wide, or only `crop` (x0, y0, x1, y1 in the original).
