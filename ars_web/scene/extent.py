@@ -96,11 +96,11 @@ def _common_focus(
     return point if looked_at.mean() > 0.7 else None
 
 
-PARALLEL = 1e-4
+PARALLEL = 1e-5
 """The mean square of the sines between optical axes, below which they have no common point worth the name."""
 
 LOOKED_AT = math.cos(math.radians(22))
-FARTHEST = 30.0
+FARTHEST = 100.0
 """What cameras look at is this near to their optical axes, and nearer than that many times the path's extent."""
 
 

@@ -57,7 +57,7 @@ def box_hit(ray: Ray, boxes: Mapping[int, Box]) -> Hit | None:
     Ts_box_world = rigid_transform.invert(Ts_world_box)
     origins = rigid_transform.transform_points(Ts_box_world, ray.origin[None, None, :])[:, 0]
     directions = Ts_box_world[:, :3, :3] @ ray.direction
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         to_low, to_high = (-sizes / 2 - origins) / directions, (sizes / 2 - origins) / directions
     # Along a slab, 0/0 on one of its faces: within it.
     entry = np.nan_to_num(np.minimum(to_low, to_high), nan=-np.inf).max(axis=1)
@@ -81,25 +81,3 @@ def camera_hit(ray: Ray, centres_world: Float[np.ndarray, "n 3"]) -> Hit | None:
     candidates = np.flatnonzero(pixels <= pixels.min() + 1.0)
     nearest = int(candidates[along[candidates].argmin()])
     return Hit(nearest, float(along[nearest]))
-
-
-def frustum_hit(
-    ray: Ray, Ts_world_camera: Float[np.ndarray, "n 4 4"], corners_camera: Float[np.ndarray, "n 5 3"]
-) -> Hit | None:
-    """The first frustum whose picture, the quadrilateral of its last four corners, the ray goes through.
-
-    Args:
-        corners_camera: as `cameras.frustum_corners` gives them; the picture's sides are parallel to x and y.
-    """
-    if not len(Ts_world_camera):
-        return None
-    Ts_camera_world = rigid_transform.invert(Ts_world_camera)
-    origins = rigid_transform.transform_points(Ts_camera_world, ray.origin[None, None, :])[:, 0]
-    directions = Ts_camera_world[:, :3, :3] @ ray.direction
-    with np.errstate(divide="ignore", invalid="ignore"):
-        distance = (corners_camera[:, 1, 2] - origins[:, 2]) / directions[:, 2]
-        points = origins[:, :2] + distance[:, None] * directions[:, :2]
-    inside = ((points >= corners_camera[:, 1, :2]) & (points <= corners_camera[:, 3, :2])).all(axis=1)
-    distance = np.where(inside & (distance > 0), distance, np.inf)
-    nearest = int(distance.argmin())
-    return Hit(nearest, float(distance[nearest])) if math.isfinite(distance[nearest]) else None
