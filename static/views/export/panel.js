@@ -1,21 +1,105 @@
-/** The export panel: which dataset, how, and what would be in it. */
+/** The export panel: which dataset and how, and beside it what would be in it. */
 
 import { html, useEffect, useSignal } from "../../lib/view.js";
 import { actions } from "../../store.js";
+import { asked, changes, format, mistakes, offer, options, refusals, reset, writers } from "./draft.js";
+import { forecast, ForecastView, isCurrent, refused, useForecast } from "./forecast.js";
+import { OptionGroup } from "./option_group.js";
+import { exports, isGoing, look, PastExports, watch } from "./past.js";
+import { many } from "./words.js";
 
-/** @typedef {import("../../store.js").Schemas} Schemas */
+/** @typedef {import("./draft.js").Option} Option */
+
+/** Options by what they are about: those of an object by its name, the others by theirs; what is new is about labels. */
+const GROUPS = [
+  { title: "Frames", holder: "frames", has: (/** @type {Option} */ { name }) => name.startsWith("frames.") || name === "sessions" },
+  { title: "Images", holder: "images", has: (/** @type {Option} */ { name }) => name === "images" },
+  { title: "Split", holder: "split", has: (/** @type {Option} */ { name }) => name.startsWith("split.") },
+  { title: "Labels", holder: "labels", has: () => true },
+];
+const ORDER = ["frames", "images", "labels", "split"];
 
 export function ExportPanel() {
-  const formats = useSignal(/** @type {Schemas["FormatsJson"] | null} */ (null));
   const problem = useSignal(/** @type {string | null} */ (null));
-  useEffect(() => {
+  const load = () => {
+    problem.value = null;
     actions.formats().then(
-      (found) => (formats.value = found),
+      (found) => offer(found.writers),
       (error) => (problem.value = error.message),
     );
-  }, []);
-  if (problem.value !== null) return html`<p class="problem" role="alert">${problem.value}</p>`;
-  return html`<section class="export-panel" aria-label="Export">
-    <ul>${formats.value?.writers.map((writer) => html`<li key=${writer.format}><strong>${writer.title}</strong> ${writer.description}</li>`)}</ul>
-  </section>`;
+  };
+  useEffect(load, []);
+  useEffect(watch, []);
+  useForecast();
+  return html`<div class="export-panel">
+    <div class="options-column">
+      <header class="top">
+        <h1>Export training set</h1>
+        ${changes.value.size > 0 &&
+        html`<button class="button" onClick=${() => reset([...changes.value.keys(), ...mistakes.value.keys()])}>Reset ${many(changes.value.size, "option")}</button>`}
+      </header>
+      ${problem.value !== null &&
+      html`<div class="row"><p class="problem" role="alert">${problem.value}</p><button class="button" onClick=${load}>Try again</button></div>`}
+      <${Formats} />
+      ${grouped().map(({ title, holder, found }) => html`<${OptionGroup} key=${holder} title=${title} holder=${holder} options=${found} />`)}
+    </div>
+    <div class="outcome-column">
+      <div class="outcome"><${ForecastView} /><${PastExports} /></div>
+      <${Start} />
+    </div>
+  </div>`;
+}
+
+function grouped() {
+  const found = new Map(ORDER.map((holder) => [holder, /** @type {Option[]} */ ([])]));
+  for (const option of options.value) {
+    const group = GROUPS.find(({ has }) => has(option));
+    if (group !== undefined) found.get(group.holder)?.push(option);
+  }
+  return ORDER.flatMap((holder) => {
+    const of = found.get(holder) ?? [];
+    const title = GROUPS.find((group) => group.holder === holder)?.title ?? holder;
+    return of.length > 0 ? [{ title, holder, found: of }] : [];
+  });
+}
+
+function Formats() {
+  return html`<div class="formats" role="radiogroup" aria-label="Format">
+    ${writers.value.map(
+      (writer) => html`<label key=${writer.format} class="card format" data-chosen=${writer.format === format.value}>
+        <input type="radio" name="format" value=${writer.format} checked=${writer.format === format.value} onChange=${() => (format.value = writer.format)} />
+        <span><strong>${writer.title}</strong><span class="meaning">${writer.description}</span></span>
+      </label>`,
+    )}
+  </div>`;
+}
+
+function Start() {
+  const starting = useSignal(false);
+  const problem = useSignal(/** @type {string | null} */ (null));
+  const held = mistakes.value.size > 0 || refusals.value.size > 0 || format.value === "";
+  const frames = isCurrent.value ? forecast.value?.frames : undefined;
+  const start = async () => {
+    if (held || starting.value) return;
+    starting.value = true;
+    problem.value = null;
+    try {
+      const made = await actions.startExport(format.value, asked.value);
+      exports.value = [made, ...(exports.value ?? []).filter((one) => one.id !== made.id)];
+      await look();
+    } catch (error) {
+      refused(/** @type {Error} */ (error));
+      problem.value = refusals.value.size > 0 ? null : /** @type {Error} */ (error).message;
+    } finally {
+      starting.value = false;
+    }
+  };
+  const going = exports.value?.filter(isGoing).length ?? 0;
+  return html`<footer class="start">
+    ${problem.value !== null && html`<p class="problem" role="alert">${problem.value}</p>`}
+    <p class="visually-hidden" role="status">${going > 0 ? `${many(going, "export")} running` : "No export is running"}</p>
+    <button class="button main" aria-disabled=${held || starting.value} onClick=${start}>
+      ${starting.value ? "Starting…" : frames === undefined ? "Start export" : `Export ${many(frames, "frame")}`}
+    </button>
+  </footer>`;
 }

@@ -1,0 +1,125 @@
+/**
+ * The export being thought out: a format, and those options that differ from their defaults. It outlives the panel, so
+ * that a look at the scene loses nothing.
+ */
+
+import { computed, signal } from "../../lib/view.js";
+import { frames } from "../../store.js";
+import { balanced, isShareOfSplit } from "./shares.js";
+
+/** @typedef {import("../../store.js").Schemas} Schemas */
+/** @typedef {Schemas["OptionJson"]} Option */
+/** @typedef {Schemas["WriterJson"]} Writer */
+
+export const writers = signal(/** @type {readonly Writer[]} */ ([]));
+/** The chosen format; empty until the server named them. */
+export const format = signal("");
+/** By the option's name; defaults are left out. */
+export const changes = signal(/** @type {ReadonlyMap<string, unknown>} */ (new Map()));
+/** What was typed and cannot be, by the option's name: such drafts are neither counted nor started. */
+export const mistakes = signal(/** @type {ReadonlyMap<string, string>} */ (new Map()));
+/** What the server refuses, by the name of the option or of the object that holds it. */
+export const refusals = signal(/** @type {ReadonlyMap<string, string>} */ (new Map()));
+
+export const writer = computed(() => writers.value.find((one) => one.format === format.value) ?? null);
+export const options = computed(() => writer.value?.options ?? []);
+/** Whether single frames are listed; the range then means nothing. */
+export const listsFrames = computed(() => changes.value.has("frames.list"));
+
+/** The options as the API takes them, without defaults. */
+export const asked = computed(() => {
+  /** @type {Record<string, any>} */
+  const found = {};
+  for (const [name, value] of changes.value) {
+    if (isIdle(name)) continue;
+    const [group, key] = name.split(".");
+    if (key === undefined) found[name] = value;
+    else (found[group] ??= {})[key] = value;
+  }
+  return found;
+});
+
+/** @param {readonly Writer[]} found */
+export function offer(found) {
+  writers.value = found;
+  if (!found.some((one) => one.format === format.value)) format.value = found[0]?.format ?? "";
+}
+
+/** Whether an option means nothing beside the others. @param {string} name */
+export function isIdle(name) {
+  return listsFrames.value && ["frames.step", "frames.start", "frames.stop"].includes(name);
+}
+
+/** @param {string} name */
+export function valueOf(name) {
+  if (changes.value.has(name)) return changes.value.get(name);
+  return options.value.find((option) => option.name === name)?.default;
+}
+
+/** @param {string} name @param {unknown} value */
+export function setOption(name, value) {
+  const next = new Map(changes.value);
+  const values = isShareOfSplit(name) ? balanced(valueOf, name, Number(value)) : [[name, value]];
+  for (const [key, one] of /** @type {[string, unknown][]} */ (values)) {
+    const standard = options.value.find((option) => option.name === key)?.default;
+    if (JSON.stringify(one) === JSON.stringify(standard)) next.delete(key);
+    else next.set(key, one);
+  }
+  changes.value = next;
+  setMistake(name, null);
+}
+
+/** @param {readonly string[]} names */
+export function reset(names) {
+  changes.value = new Map([...changes.value].filter(([name]) => !names.includes(name)));
+  mistakes.value = new Map([...mistakes.value].filter(([name]) => !names.includes(name)));
+}
+
+/** @param {string} name @param {string | null} text */
+export function setMistake(name, text) {
+  if ((mistakes.value.get(name) ?? null) === text) return;
+  const next = new Map(mistakes.value);
+  if (text === null) next.delete(name);
+  else next.set(name, text);
+  mistakes.value = next;
+}
+
+/**
+ * What cannot be in a value, in words; null: nothing that can be told without the server.
+ * @param {Option} option
+ * @param {unknown} value
+ */
+export function wrong(option, value) {
+  if (typeof value === "number") {
+    const { minimum, maximum } = option;
+    if (option.type === "integer" && !Number.isInteger(value)) return `${value} is not a whole number.`;
+    if (minimum !== null && value < minimum) return `${value} is too small: it can be ${minimum} at least.`;
+    if (maximum !== null && value > maximum) return `${value} is too large: it can be ${maximum} at most.`;
+  }
+  const merged = changes.value.has("sessions");
+  const last = frames.value - 1;
+  if (option.name === "frames.start" && !merged && Number(value) > last) {
+    return `There is no frame ${value}: the last one is ${last}.`;
+  }
+  if (option.name === "frames.list" && Array.isArray(value)) {
+    const beyond = value.find((index) => index > last);
+    if (beyond !== undefined) return `There is no frame ${beyond}: the last one is ${last}.`;
+  }
+  return null;
+}
+
+/**
+ * Put what the server says of a request to the options that it names.
+ * @param {readonly {where: string, message: string}[]} errors
+ */
+export function refuse(errors) {
+  /** @type {Map<string, string>} */
+  const found = new Map();
+  const names = options.value.flatMap(({ name }) => [name, name.split(".")[0]]);
+  for (const { where, message } of errors) {
+    const path = where.replace(/^body\.options\./, "");
+    const of = [path, ...names].find((name) => names.includes(name) && (path === name || path.startsWith(`${name}.`)));
+    found.set(of ?? "", message);
+  }
+  refusals.value = found;
+}
