@@ -33,7 +33,7 @@ ENV PATH=/opt/ars-web/bin:$PATH \
 USER ars
 WORKDIR /sessions
 # Shows that the image works, and leaves the compiled kernels for the first real use.
-RUN ars-web demo --no-browser --sessions /tmp/demo && rm -r /tmp/demo && ars-web check
+RUN ars-web demo --no-serve --sessions /tmp/demo && rm -r /tmp/demo && ars-web check
 VOLUME /sessions
 EXPOSE 8000
 HEALTHCHECK --interval=30s --timeout=5s --start-period=20s \

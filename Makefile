@@ -1,5 +1,5 @@
 # Each of these does all its own set-up: it needs only python3 (3.11 or later), make and this checkout.
-#   make demo     the generated recording, imported, boxed and exported
+#   make demo     the generated recording, imported and boxed, opened in the browser
 #   make test     the tests
 #   make check    format, lint, types and who may import whom, of the page too
 #   make types    the page's types of the API, from its OpenAPI document

@@ -1,5 +1,6 @@
 """The one place where the API, the page, the store and the export jobs are joined, opened and closed."""
 
+import errno
 import gc
 import importlib
 import ipaddress
@@ -220,16 +221,28 @@ def static_folder() -> Path:
     raise StoreError(f"{package / 'static'}: the page's files are missing; install ARS Web again")
 
 
-def serve(settings: Settings, *, on_ready: Callable[[str], None] | None = None) -> None:
+def serve(
+    settings: Settings,
+    *,
+    session: str | None = None,
+    or_any_port: bool = False,
+    on_ready: Callable[[str], None] | None = None,
+) -> None:
     """Serve until interrupted. Prints where, with a one-time login URL, which `on_ready` is called with, too.
+
+    Args:
+        session: that the login leads to; None: to the list of sessions.
+        or_any_port: take a free port where the one of the settings is taken, and say so.
 
     Raises:
         BadInput: the address cannot be listened on.
         StoreError: the sessions folder or its token cannot be used.
     """
     token = sessions_token(settings)
-    with listening(settings.host, settings.port) as listener:
+    with listening(settings.host, settings.port, or_any=or_any_port) as listener:
         port = listener.getsockname()[1]
+        if or_any_port and settings.port not in (0, port):
+            sys.stdout.write(f"Port {settings.port} is taken; this is another.\n")
         settings = settings.model_copy(update={"token": token, "port": port})
         app = create_app(settings)
         # No access log: the one-time code is part of an address. No proxy headers: they could be anyone's.
@@ -246,6 +259,8 @@ def serve(settings: Settings, *, on_ready: Callable[[str], None] | None = None) 
         def ready() -> None:
             base = f"http://{_shown_host(settings.host)}:{port}"
             url = f"{base}/login?code={app.state.services.codes.issue()}"
+            if session is not None:
+                url += f"&next=/sessions/{session}"
             _announce(settings, base, url)
             if on_ready is not None:
                 on_ready(url)
@@ -285,8 +300,8 @@ class _Server(uvicorn.Server):
         await super().shutdown(sockets)
 
 
-def listening(host: str, port: int) -> socket.socket:
-    """A socket that listens on `host`; port 0 takes a free one.
+def listening(host: str, port: int, *, or_any: bool = False) -> socket.socket:
+    """A socket that listens on `host`; port 0 takes a free one, and so does `or_any` where the port is taken.
 
     Raises:
         BadInput: the address cannot be had.
@@ -301,6 +316,8 @@ def listening(host: str, port: int) -> socket.socket:
         listener.listen(2048)
     except OSError as error:
         listener.close()
+        if or_any and error.errno == errno.EADDRINUSE:
+            return listening(host, 0)
         raise BadInput(f"cannot listen on {host}:{port}: {error.strerror}; choose another host or port") from error
     return listener
 

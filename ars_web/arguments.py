@@ -29,6 +29,12 @@ Json = Annotated[bool, typer.Option("--json", help="Print JSON on stdout and not
 Force = Annotated[bool, typer.Option("--force", help="Replace the file where it exists.")]
 Name = Annotated[str | None, typer.Option("--name", metavar="NAME", help="The session's name; default: as it came.")]
 Port = Annotated[int, typer.Option("--port", metavar="N", min=0, max=65535, help="Port; 0 takes a free one.")]
+DemoPort = Annotated[
+    int | None,
+    typer.Option(
+        "--port", metavar="N", min=0, max=65535, help="Port; default: 8000, or a free one where that is taken."
+    ),
+]
 
 # serve
 Host = Annotated[str, typer.Option("--host", metavar="HOST", help="Address to listen on.")]

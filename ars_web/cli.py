@@ -8,6 +8,7 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
+from contextlib import ExitStack
 from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -27,6 +28,9 @@ AUTHOR = "cli"
 
 INTERRUPTED = 130
 """Exit status after Ctrl-C, as shells count it: 128 + SIGINT."""
+
+DEMO_PORT = 8000
+"""Where the demo is served, unless something else is there."""
 
 SKIPPED_SHOWN = 5
 """Skipped frames that `import` names one by one; the rest are counted."""
@@ -62,27 +66,44 @@ def top(
 @app.command()
 def demo(
     browser: Annotated[
-        bool, typer.Option("--browser/--no-browser", help="Serve the session and open its page.")
+        bool, typer.Option("--browser/--no-browser", help="Open the session's page, where there is a screen.")
     ] = True,
-    port: take.Port = 8000,
+    port: take.DemoPort = None,
+    serve_it: Annotated[
+        bool, typer.Option("--serve/--no-serve", help="Serve it until Ctrl-C, or make all of it and end.")
+    ] = True,
     sessions: take.Sessions = take.SESSIONS,
 ) -> None:
-    """Make the generated recording, import, box and export it, and open it in the browser.
+    """Make the generated recording, import and box it, and open it in the browser.
 
-    What is there already is kept, so a second run is quick. With --no-browser, or where there is no screen, it
-    prints where everything is and ends.
+    What is there already is kept, so a second run is quick. Datasets and pictures are made while it is served.
     """
-    from ars_web.demonstration import prepare
+    from ars_web import demonstration
 
-    made = prepare(sessions, show=progress)
-    print(f"session   {made.session} in {sessions.resolve()}")
-    for name, folder in made.datasets.items():
-        print(f"dataset   {folder} ({name})")
-    print(f"pictures  {made.pictures}")
-    if browser and has_screen():
-        from ars_web.app import serve as run_server
+    made = demonstration.prepare(sessions, show=progress)
+    print(f"session   {made.session} in {sessions.resolve()}", flush=True)
+    if not serve_it:
+        demonstration.make_datasets(sessions, made, show=progress)
+        print(*made.lines(), sep="\n")
+        return
 
-        run_server(take.server_settings({"sessions": sessions, "port": port}), on_ready=open_browser)
+    from ars_web.app import serve as run_server
+
+    settings = take.server_settings(
+        {"sessions": sessions, "port": DEMO_PORT if port is None else port, "roots": {"demo": made.home}}
+    )
+
+    def say(line: str) -> None:
+        print(line, flush=True)
+
+    with ExitStack() as stack:
+
+        def ready(url: str) -> None:
+            if browser and has_screen():
+                open_browser(url)
+            stack.enter_context(demonstration.making_datasets(sessions, made, tell=say))
+
+        run_server(settings, session=made.session, or_any_port=port is None, on_ready=ready)
 
 
 @app.command()

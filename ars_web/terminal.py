@@ -93,7 +93,8 @@ def has_screen() -> bool:
 
 
 def open_browser(url: str) -> None:
-    """The page at `url`, in the person's browser."""
+    """The page at `url`, in the person's browser; whoever calls does not wait for it."""
+    import threading
     import webbrowser
 
-    webbrowser.open(url)
+    threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()

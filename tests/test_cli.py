@@ -5,6 +5,7 @@ import json
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -12,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
-from urllib.request import urlopen
+from urllib.request import HTTPCookieProcessor, build_opener, urlopen
 
 import cv2
 import numpy as np
@@ -345,8 +346,17 @@ def test_serve_prints_a_login_address_and_ends_with_ctrl_c(run: Commands) -> Non
     assert "Traceback" not in output.stderr
 
 
-def test_the_demo_is_made_once_and_exported_anew_when_its_session_changes(run: Commands, tmp_path: Path) -> None:
-    first = run("demo", "--no-browser").stdout
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Commands, str]:
+    """The demo, made; and what was printed."""
+    run = Commands(tmp_path_factory.mktemp("demo") / "sessions")
+    return run, run("demo", "--no-serve").stdout
+
+
+def test_the_demo_is_made_once_and_exported_anew_when_its_session_changes(
+    demo: tuple[Commands, str], tmp_path: Path
+) -> None:
+    run, first = demo
     home = run.sessions / ".demo"
     assert all(str(home / name) in first for name in ("yolo", "coco", "pictures"))
     assert len(list((home / "pictures").glob("*.png"))) == 6
@@ -357,23 +367,93 @@ def test_the_demo_is_made_once_and_exported_anew_when_its_session_changes(run: C
         return {path: path.stat().st_mtime_ns for path in home.rglob("[!.]*") if path.is_file()}
 
     before = times()
-    assert run("demo", "--no-browser").stdout == first
+    assert run("demo", "--no-serve").stdout == first
     assert times() == before
 
     boxes = tmp_path / "boxes.json"
     boxes.write_text(json.dumps([BOX]))
     run("boxes", "import", "demo", boxes)
-    run("demo", "--no-browser")
+    run("demo", "--no-serve")
     changed = json.loads((home / "yolo" / "dataset.json").read_text())
     assert (report["sessions"][0]["revision"], changed["sessions"][0]["revision"]) == (0, 1)
     assert len(json.loads(run("list", "--json").stdout)) == 1
 
     # As if a newer version had rendered the images again: the session that was made from the old ones goes.
     (home / "recording" / "truth.json").touch()
-    run("demo", "--no-browser")
+    run("demo", "--no-serve")
     (fresh,) = json.loads(run("list", "--json").stdout)
     assert fresh["id"] != report["sessions"][0]["id"]
     assert fresh["revision"] == 0
+
+
+def read_until(process: subprocess.Popen[str], begin: str) -> list[str]:
+    """What a process prints, up to a line that begins so."""
+    assert process.stdout is not None
+    lines: list[str] = []
+    for line in process.stdout:
+        lines.append(line)
+        if line.startswith(begin):
+            return lines
+    raise AssertionError("".join(lines) + process.communicate()[1])
+
+
+def test_the_demo_is_served_and_its_datasets_are_made_meanwhile(demo: tuple[Commands, str], tmp_path: Path) -> None:
+    run, _ = demo
+    (session,) = json.loads(run("list", "--json").stdout)
+    boxes = tmp_path / "boxes.json"
+    boxes.write_text(json.dumps([BOX]))
+    run("boxes", "import", "demo", boxes)
+    with run.start("demo", "--no-browser", "--port", 0) as process:
+        *_, said = read_until(process, "Log in, once,")
+        address = said.split()[-1]
+        assert address.endswith(f"&next=/sessions/{session['id']}")
+        browser = build_opener(HTTPCookieProcessor())
+        with browser.open(address, timeout=30) as page:
+            assert page.url.endswith(f"/sessions/{session['id']}")
+            assert b"Log in" not in page.read()
+        base = address.partition("/login")[0]
+        with browser.open(f"{base}/api/roots/demo/folders", timeout=30) as answer:
+            assert {"name": "recording", "formats": ["ars"], "images": 60, "problem": None} in json.load(answer)[
+                "folders"
+            ]
+        made = read_until(process, "pictures")
+        assert [line.split()[0] for line in made] == ["dataset", "dataset", "pictures"]
+        report = json.loads((run.sessions / ".demo" / "yolo" / "dataset.json").read_text())
+        assert report["sessions"][0]["revision"] == session["revision"] + 1
+        with urlopen(f"{base}/api/health", timeout=30) as answer:
+            assert answer.status == 200
+        process.send_signal(signal.SIGINT)
+        output = Output(*process.communicate(timeout=60))
+    assert (process.returncode in (0, 130), output.stderr) == (True, "")
+
+
+def test_the_demo_is_stopped_while_its_datasets_are_made(demo: tuple[Commands, str]) -> None:
+    run, _ = demo
+    made_from = run.sessions / ".demo" / "made-from.json"
+    made_from.unlink()
+    with run.start("demo", "--no-browser", "--port", 0) as process:
+        read_until(process, "Log in, once,")
+        process.send_signal(signal.SIGINT)
+        output = Output(*process.communicate(timeout=60))  # it would wait for a process that still writes to it
+    assert (process.returncode in (0, 130), output) == (True, Output("", ""))
+    assert not made_from.exists()
+    run("demo", "--no-serve")
+    assert made_from.exists()
+
+
+def test_the_demo_takes_another_port_only_where_none_was_asked_for(demo: tuple[Commands, str]) -> None:
+    run, _ = demo
+    with contextlib.ExitStack() as stack:
+        with contextlib.suppress(OSError):  # where somebody else has it, it is taken as well
+            stack.enter_context(socket.create_server(("127.0.0.1", 8000)))
+        with run.start("demo", "--no-browser") as process:
+            said = read_until(process, "Log in, once,")
+            process.send_signal(signal.SIGINT)
+            process.communicate(timeout=60)
+        assert "Port 8000 is taken; this is another.\n" in said
+        assert ":8000/" not in said[-1]
+        refused = run("demo", "--no-browser", "--port", 8000, status=1)
+        assert "cannot listen on 127.0.0.1:8000: Address already in use" in refused.stderr
 
 
 def test_version_and_help_name_every_command(run: Commands) -> None:
