@@ -33,6 +33,9 @@ SUBPROTOCOL = re.compile(r"viser-v[0-9.]{1,20}")
 OPEN_SECONDS = 10.0
 """How long the scene's server may take to answer; it is on this machine."""
 
+CLOSE_SECONDS = 2.0
+"""How long it may take to say goodbye, where a browser went while much was on its way to it."""
+
 QUEUE = 4
 """Messages that wait for a slow browser before the scene's server is made to wait."""
 
@@ -82,6 +85,7 @@ async def proxy(browser: WebSocket, sid: str, services: ServicesDep, author: Aut
             max_size=None,
             max_queue=QUEUE,
             open_timeout=OPEN_SECONDS,
+            close_timeout=CLOSE_SECONDS,
             ping_interval=None,
             proxy=None,
         )
