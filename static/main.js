@@ -126,7 +126,7 @@ async function openWorkspace(id) {
   effect(() => void (document.title = `${store.session.value?.name ?? ""} · ARS Web`));
   effect(keepView);
   addEventListener("keydown", (event) => {
-    if (!isTyping(event.target) && press(event)) event.preventDefault();
+    if (!isTyping(event) && press(event)) event.preventDefault();
   });
   addEventListener("beforeunload", (event) => {
     void editing.finishEdit();
@@ -135,9 +135,11 @@ async function openWorkspace(id) {
   render(h(Workspace, { view: line.view }), PAGE);
 }
 
-/** Whether a key goes into text. @param {EventTarget | null} target */
-function isTyping(target) {
+/** Whether a key goes into text. @param {KeyboardEvent} event */
+function isTyping({ target, ctrlKey, metaKey }) {
   if (!(target instanceof HTMLElement)) return false;
+  // A number that nothing was typed into has nothing of its own to undo.
+  if ((ctrlKey || metaKey) && target.dataset.typing === "false") return false;
   const takesText = target instanceof HTMLInputElement && !["range", "checkbox", "radio", "color"].includes(target.type);
   return takesText || target instanceof HTMLTextAreaElement || target instanceof HTMLSelectElement || target.isContentEditable;
 }

@@ -119,7 +119,7 @@ export function NumberField(props) {
       ref=${input} id=${id} role="spinbutton" aria-label=${label} aria-valuenow=${Number(shown(value).replace("°", ""))}
       aria-valuetext=${`${shown(value)}${kind === "length" ? " mm" : ""}`} aria-invalid=${problem.value !== null}
       aria-describedby=${problem.value === null ? undefined : `${id}-problem`}
-      title=${title} value=${text} readonly=${locked} autocomplete="off" spellcheck=${false} enterkeyhint="done"
+      data-typing=${draft.value !== null} title=${title} value=${text} readonly=${locked} autocomplete="off" spellcheck=${false} enterkeyhint="done"
       onPointerDown=${(/** @type {PointerEvent} */ event) => {
         if (document.activeElement === input.current) return;
         // Or the release would undo the selection.
