@@ -1,7 +1,10 @@
-// @ts-check
 /** Trades the token for the page's cookie. */
 
 import { ApiError, logIn } from "./api.js";
+import { followTheme } from "./lib/theme.js";
+import { theme } from "./store.js";
+
+followTheme(theme);
 
 const form = /** @type {HTMLFormElement} */ (document.getElementById("login"));
 const token = /** @type {HTMLInputElement} */ (document.getElementById("token"));

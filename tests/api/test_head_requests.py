@@ -17,7 +17,7 @@ import pytest
         "/api/sessions/{sid}/frames/0/image",
         "/api/sessions/{sid}/history",
         "/api/sessions/nope",
-        "/static/style.css",
+        "/static/styles/base.css",
         "/nowhere",
     ],
 )
