@@ -153,8 +153,9 @@ class BoxEditor:
         drag = self._drag
         if drag is None or isinstance(drag.how, Resize):
             return
-        self._follow(drag.how.to(T_world_gizmo))
-        if phase == "end":
+        if phase == "update":
+            self._follow(drag.how.to(T_world_gizmo))
+        else:  # at the pose of the last update
             self._release()
 
     def _handle_dragged(self, pull: Pull) -> None:

@@ -22,6 +22,9 @@ MINUS = "\u2212"
 LEAST_SIZE = 1e-3
 """Metres: no side is dragged to less, so that its handles stay apart; a smaller one can be typed."""
 
+STILL = 1e-9
+"""Radians: what the gizmo's pose is turned by in the browser's rounding."""
+
 STEEPEST = math.sin(math.radians(6))
 """A face that looks at the viewer within 6 degrees cannot be dragged: a pixel would be many times its length."""
 
@@ -87,7 +90,7 @@ class Turn:
             axis = int(np.argmax(np.abs(vector)))
         angle = snapped(float(vector[axis]), step=self.snap)
         text = f"{AXES[axis]} {_signed(math.degrees(angle))}°"
-        if angle == 0.0:
+        if abs(angle) < STILL:
             return Dragging(self.box, text)
         R = start @ _about(axis, angle) @ start.T @ self.box.T_world_box[:3, :3]
         T = rigid_transform.from_rotation(rigid_transform.nearest_rotation(R), self.box.T_world_box[:3, 3])

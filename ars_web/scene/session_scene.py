@@ -221,9 +221,11 @@ class SessionScene:
     def _act(self, name: str, action: ViewAction) -> None:
         views = self._views(name)
         if isinstance(action, NewBox):
-            # Once, however many browsers show the view; a page that closes may still be one of them.
-            if views and not hardening.is_gone(views[-1].client):
-                view = views[-1]
+            # Once, by the newest: a page that is loaded again may still be there twice.
+            view = next((view for view in reversed(views) if not hardening.is_gone(view.client)), None)
+            if view is None:
+                self._tell(name, Refused("the 3D scene is not connected yet; add the box once it shows"))
+            else:
                 self._workers.submit(self._add_box, view, view.sight(), action.class_id)
             return
         for view in views:
