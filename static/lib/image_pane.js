@@ -117,6 +117,7 @@ export class ImagePane {
     image.decoding = "async";
     this.#address = address;
     this.#image = null;
+    this.#element.ariaBusy = "true";
     this.#redraw("both");
     image.src = address;
     const loaded = await image.decode().then(
@@ -124,6 +125,7 @@ export class ImagePane {
       () => false,
     );
     if (this.#address !== address || this.#stopped.signal.aborted) return "replaced";
+    this.#element.ariaBusy = "false";
     if (!loaded) return "failed";
     this.#image = image;
     if (before === null || before.naturalWidth !== image.naturalWidth || before.naturalHeight !== image.naturalHeight) this.#fits = true;

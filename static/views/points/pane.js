@@ -27,7 +27,6 @@ export function PointsPane({ name, frame, other, active, onFrame, onActive, onSu
   const place = useRef(/** @type {HTMLDivElement | null} */ (null));
   const pane = useRef(/** @type {ImagePane | null} */ (null));
   const frameNow = useRef(frame);
-  frameNow.current = frame;
   const [zoom, setZoom] = useState(1);
   const [broken, setBroken] = useState(/** @type {string | null} */ (null));
   const count = frames.value;
@@ -44,7 +43,9 @@ export function PointsPane({ name, frame, other, active, onFrame, onActive, onSu
     return () => made.stop();
   }, []);
 
-  useEffect(() => {
+  // With the frame's number, not after it: a click must never count for a frame that is not yet seen.
+  useLayoutEffect(() => {
+    frameNow.current = frame;
     setBroken(null);
     const address = actions.imageAddress(frame);
     pane.current?.show(address).then(async (result) => {
