@@ -23,6 +23,31 @@ export const refusals = signal(/** @type {ReadonlyMap<string, string>} */ (new M
 
 export const writer = computed(() => writers.value.find((one) => one.format === format.value) ?? null);
 export const options = computed(() => writer.value?.options ?? []);
+/** What cannot be beside the other options, or in this session, by the option's name. */
+export const clashes = computed(() => {
+  /** @type {Map<string, string>} */
+  const found = new Map();
+  const merged = /** @type {string[]} */ (valueOf("sessions") ?? []).length;
+  const last = frames.value - 1;
+  const list = /** @type {number[] | null} */ (valueOf("frames.list") ?? null);
+  const [start, stop] = [Number(valueOf("frames.start") ?? 0), /** @type {number | null} */ (valueOf("frames.stop") ?? null)];
+  if (list !== null) {
+    const beyond = list.find((index) => index > last);
+    if (beyond !== undefined) found.set("frames.list", `There is no frame ${beyond}: the last one is ${last}.`);
+  } else if (start > last && merged === 0) {
+    found.set("frames.start", `There is no frame ${start}: the last one is ${last}.`);
+  } else if (stop !== null && stop <= start) {
+    found.set("frames.stop", `No frame would be left: the first one is ${start}.`);
+  }
+  const wanted = ["split.train", "split.val", "split.test"].filter((name) => Number(valueOf(name)) > 0).length;
+  if (valueOf("split.by") === "session" && merged + 1 < wanted) {
+    found.set("split.by", `${wanted} shares need ${wanted} sessions at least: choose more under “Merge with”, or divide by block.`);
+  }
+  return found;
+});
+/** Whether the draft can be counted and started, for all that the page knows. */
+export const isSound = computed(() => mistakes.value.size === 0 && clashes.value.size === 0);
+
 /** Whether single frames are listed; the range then means nothing. */
 export const listsFrames = computed(() => changes.value.has("frames.list"));
 
@@ -85,7 +110,7 @@ export function setMistake(name, text) {
 }
 
 /**
- * What cannot be in a value, in words; null: nothing that can be told without the server.
+ * What is wrong with a value by itself, in words; null: nothing.
  * @param {Option} option
  * @param {unknown} value
  */
@@ -95,15 +120,6 @@ export function wrong(option, value) {
     if (option.type === "integer" && !Number.isInteger(value)) return `${value} is not a whole number.`;
     if (minimum !== null && value < minimum) return `${value} is too small: it can be ${minimum} at least.`;
     if (maximum !== null && value > maximum) return `${value} is too large: it can be ${maximum} at most.`;
-  }
-  const merged = changes.value.has("sessions");
-  const last = frames.value - 1;
-  if (option.name === "frames.start" && !merged && Number(value) > last) {
-    return `There is no frame ${value}: the last one is ${last}.`;
-  }
-  if (option.name === "frames.list" && Array.isArray(value)) {
-    const beyond = value.find((index) => index > last);
-    if (beyond !== undefined) return `There is no frame ${beyond}: the last one is ${last}.`;
   }
   return null;
 }

@@ -74,9 +74,9 @@ function TypedField({ option, value, idle, invalid, labelledBy, describedBy, tex
   };
   /** @param {KeyboardEvent} event */
   const keys = (event) => {
-    event.stopPropagation();
     const input = /** @type {HTMLInputElement} */ (event.currentTarget);
     if (event.key === "Escape") {
+      event.stopPropagation();
       if (draft.value === null) input.blur();
       draft.value = null;
       setMistake(option.name, null);
@@ -84,6 +84,7 @@ function TypedField({ option, value, idle, invalid, labelledBy, describedBy, tex
       if (!invalid) draft.value = null;
     } else if (step !== undefined && (event.key === "ArrowUp" || event.key === "ArrowDown")) {
       event.preventDefault();
+      event.stopPropagation();
       const least = option.type === "integer" ? 1 : 0;
       const by = Math.max(least, step * (event.shiftKey ? 10 : event.altKey ? 0.1 : 1)) * (event.key === "ArrowUp" ? 1 : -1);
       const [low, high] = [option.minimum ?? -Infinity, option.maximum ?? Infinity];

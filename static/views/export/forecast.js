@@ -1,12 +1,13 @@
 /** What an export would write, counted by the server as the options change. */
 
-import { html, signal, untracked, useSignalEffect } from "../../lib/view.js";
+import { html, signal, useSignalEffect } from "../../lib/view.js";
 import { actions, classes, revision } from "../../store.js";
-import { asked, format, mistakes, refusals, refuse } from "./draft.js";
+import { asked, format, isSound, refusals, refuse } from "./draft.js";
 import { Advice } from "./advice.js";
 import { figure, imagesWords, many, REASONS, size, SPLITS } from "./words.js";
 
 /** @typedef {import("../../store.js").Schemas["Forecast"]} Forecast */
+/** @typedef {Error & {status?: number, errors?: readonly {where: string, message: string}[]}} Refusal what actions reject with */
 
 /** Milliseconds without a change before the server is asked. */
 const PAUSE = 250;
@@ -17,17 +18,19 @@ export const forecast = signal(/** @type {Forecast | null} */ (null));
 export const isCurrent = signal(false);
 const counting = signal(false);
 const problem = signal(/** @type {string | null} */ (null));
+/** Whether asking once more, without any change, may help. */
+const fleeting = signal(false);
 const again = signal(0);
 
 /** Ask whenever the options or the session change, one question at a time. */
 export function useForecast() {
   useSignalEffect(() => {
     const [kind, options] = [format.value, asked.value];
-    const mistaken = mistakes.value.size > 0;
+    const sound = isSound.value;
     void revision.value;
     void again.value;
     isCurrent.value = false;
-    if (kind === "" || mistaken) return void (counting.value = false);
+    if (kind === "" || !sound) return void (counting.value = false);
     counting.value = true;
     const stop = new AbortController();
     const timer = setTimeout(() => void ask(kind, options, stop.signal), PAUSE);
@@ -49,24 +52,25 @@ async function ask(kind, options, stop) {
     refusals.value = new Map();
   } catch (error) {
     if (stop.aborted) return;
-    refused(/** @type {Error & {errors?: readonly {where: string, message: string}[]}} */ (error));
+    refused(/** @type {Refusal} */ (error));
   }
   counting.value = false;
 }
 
 /**
  * Show what is wrong at the options that it names, and here where it names none.
- * @param {Error & {errors?: readonly {where: string, message: string}[]}} error
+ * @param {Refusal} error
  */
 export function refused(error) {
   refuse(error.errors ?? []);
   const known = refusals.value.size > 0 && !refusals.value.has("");
   problem.value = known ? null : error.message;
+  fleeting.value = error.status === 0 || Number(error.status) >= 500;
 }
 
 export function ForecastView() {
   const found = forecast.value;
-  const held = mistakes.value.size > 0 || refusals.value.size > 0;
+  const held = !isSound.value || refusals.value.size > 0;
   return html`<section class="forecast" aria-label="What would be written" aria-busy=${counting.value}>
     <header>
       <h2 class="heading">What would be written</h2>
@@ -75,7 +79,7 @@ export function ForecastView() {
     ${problem.value !== null &&
     html`<div class="row">
       <p class="problem" role="alert">${problem.value}</p>
-      <button class="button" onClick=${() => untracked(() => again.value++)}>Try again</button>
+      ${fleeting.value && html`<button class="button" onClick=${() => again.value++}>Try again</button>`}
     </div>`}
     ${found !== null &&
     html`<div class="figures" data-stale=${!isCurrent.value}>
@@ -94,7 +98,7 @@ function Totals({ found }) {
     <div><dt>Frames</dt><dd data-count="frames">${figure(found.frames)}</dd></div>
     <div><dt>Labels</dt><dd data-count="labels">${figure(labels)}</dd></div>
     <div title="Of all images, linked ones too"><dt>Download, about</dt><dd data-count="image_bytes">${size(found.image_bytes)}</dd></div>
-    <div title="Of the images that are not linked"><dt>New on the disk</dt><dd data-count="new_bytes">${size(found.new_bytes)}</dd></div>
+    <div title="Room on the disk for the images that are not linked"><dt>New image data</dt><dd data-count="new_bytes">${found.new_bytes === 0 ? "none" : size(found.new_bytes)}</dd></div>
     <p class="muted">Images: <span data-count="images">${imagesWords(found.images)}</span></p>
   </dl>`;
 }

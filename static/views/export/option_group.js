@@ -2,7 +2,7 @@
 
 import { Icon } from "../../lib/icon.js";
 import { html, useId } from "../../lib/view.js";
-import { isIdle, changes, mistakes, refusals, reset, valueOf } from "./draft.js";
+import { changes, clashes, isIdle, mistakes, refusals, reset, valueOf } from "./draft.js";
 import { ChoiceField, FrameListField, NumberOption, SessionsField } from "./fields.js";
 import { valueWords } from "./words.js";
 
@@ -23,23 +23,24 @@ export function OptionGroup({ title, holder, options }) {
       html`<button class="button link" aria-label=${`Reset ${title}`} onClick=${() => reset(changed)}>Reset ${changed.length}</button>`}
     </header>
     ${refusal !== undefined && !options.some(({ name }) => name === holder) && html`<p class="problem" role="alert">${refusal}</p>`}
-    ${options.map((option) => html`<${OptionRow} key=${option.name} option=${option} />`)}
+    ${options.map((option) => html`<${OptionRow} key=${option.name} option=${option} alone=${options.length === 1 && option.title === title} />`)}
   </section>`;
 }
 
-/** @param {{option: Option}} props */
-function OptionRow({ option }) {
+/** @param {{option: Option, alone: boolean}} props `alone`: its group says its title already */
+function OptionRow({ option, alone }) {
   const id = useId();
   const { name } = option;
   const changed = changes.value.has(name);
-  const problem = mistakes.value.get(name) ?? refusals.value.get(name);
+  const problem = mistakes.value.get(name) ?? clashes.value.get(name) ?? refusals.value.get(name);
   const Field = FIELDS[option.type];
   const idle = isIdle(name);
   const wide = ["choice", "integers", "texts"].includes(option.type);
   return html`<div class="option" data-name=${name} data-changed=${changed} data-idle=${idle} data-wide=${wide}>
     <div class="says">
-      <span class="title" id=${`${id}-title`}>${option.title}</span>
+      <span class=${alone ? "visually-hidden" : "title"} id=${`${id}-title`}>${option.title}</span>
       ${changed &&
+      !alone &&
       html`<button
         class="button quiet reset" title=${`Reset to the default, ${valueWords(option, option.default)}`}
         aria-label=${`Reset ${option.title} to ${valueWords(option, option.default)}`} onClick=${() => reset([name])}

@@ -2,10 +2,10 @@
 
 import { html, useEffect, useSignal } from "../../lib/view.js";
 import { actions } from "../../store.js";
-import { asked, changes, format, mistakes, offer, options, refusals, reset, writers } from "./draft.js";
+import { asked, changes, format, isSound, mistakes, offer, options, refusals, reset, writers } from "./draft.js";
 import { forecast, ForecastView, isCurrent, refused, useForecast } from "./forecast.js";
 import { OptionGroup } from "./option_group.js";
-import { exports, isGoing, look, PastExports, watch } from "./past.js";
+import { begin, exports, isGoing, PastExports, watch } from "./past.js";
 import { many } from "./words.js";
 
 /** @typedef {import("./draft.js").Option} Option */
@@ -77,7 +77,7 @@ function Formats() {
 function Start() {
   const starting = useSignal(false);
   const problem = useSignal(/** @type {string | null} */ (null));
-  const held = mistakes.value.size > 0 || refusals.value.size > 0 || format.value === "";
+  const held = !isSound.value || refusals.value.size > 0 || format.value === "";
   const frames = isCurrent.value ? forecast.value?.frames : undefined;
   const start = async () => {
     if (held || starting.value) return;
@@ -85,8 +85,7 @@ function Start() {
     problem.value = null;
     try {
       const made = await actions.startExport(format.value, asked.value);
-      exports.value = [made, ...(exports.value ?? []).filter((one) => one.id !== made.id)];
-      await look();
+      await begin(made);
     } catch (error) {
       refused(/** @type {Error} */ (error));
       problem.value = refusals.value.size > 0 ? null : /** @type {Error} */ (error).message;

@@ -2,7 +2,7 @@
 
 import { Icon } from "../../lib/icon.js";
 import { ago } from "../../lib/time.js";
-import { html, signal, useSignal } from "../../lib/view.js";
+import { html, signal, useEffect, useRef, useSignal } from "../../lib/view.js";
 import { actions } from "../../store.js";
 import { writers } from "./draft.js";
 import { duration, figure, many, optionsWords, size, SPLITS } from "./words.js";
@@ -15,6 +15,8 @@ const INTERVAL = 1000;
 
 /** The newest first; null: not known yet. */
 export const exports = signal(/** @type {readonly Export[] | null} */ (null));
+/** The export that was started here last: it is brought into sight. */
+const newest = signal("");
 const problem = signal(/** @type {string | null} */ (null));
 /** When each running export was first seen to move, by its id, and how far it was then: what time is left follows. */
 const begun = new Map(/** @type {[string, {at: number, done: number}][]} */ ([]));
@@ -34,6 +36,13 @@ export function watch() {
     watchers--;
     clearTimeout(timer);
   };
+}
+
+/** Show an export that was just started. @param {Export} made */
+export async function begin(made) {
+  exports.value = [made, ...(exports.value ?? []).filter((one) => one.id !== made.id)];
+  newest.value = made.id;
+  await look();
 }
 
 export async function look() {
@@ -79,8 +88,14 @@ export function PastExports() {
 
 /** @param {{one: Export}} props */
 function Row({ one }) {
+  const row = useRef(/** @type {HTMLLIElement | null} */ (null));
   const asking = useSignal(false);
   const wrong = useSignal(/** @type {string | null} */ (null));
+  useEffect(() => {
+    if (newest.value !== one.id) return;
+    row.current?.scrollIntoView({ block: "nearest" });
+    newest.value = "";
+  }, []);
   const writer = writers.value.find(({ format }) => format === one.format);
   const title = writer?.title ?? one.format;
   const words = optionsWords(writer?.options ?? [], one.options);
@@ -94,7 +109,7 @@ function Row({ one }) {
       wrong.value = /** @type {Error} */ (error).message;
     }
   };
-  return html`<li data-export=${one.id} data-state=${one.state}>
+  return html`<li ref=${row} data-export=${one.id} data-state=${one.state}>
     <div class="head">
       <strong>${title}</strong>
       <span class="muted" title=${new Date(one.created).toLocaleString("en")}>${ago(new Date(one.ended ?? one.created), new Date())}</span>

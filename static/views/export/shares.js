@@ -4,7 +4,7 @@
 const NAMES = ["split.train", "split.val", "split.test"];
 
 /** Shares are whole numbers of these, so that adding them leaves no dust. */
-const PARTS = 1000;
+const PARTS = 10_000;
 
 /** @param {string} name */
 export function isShareOfSplit(name) {

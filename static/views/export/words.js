@@ -77,7 +77,7 @@ export function optionsWords(known, used, nameOf) {
   return known.flatMap((option) => {
     const value = option.name.split(".").reduce((/** @type {any} */ inner, key) => inner?.[key], used);
     if (value === undefined || JSON.stringify(value) === JSON.stringify(option.default)) return [];
-    return [`${option.title} ${valueWords(option, value, nameOf)}`];
+    return [`${option.title}: ${valueWords(option, value, nameOf)}`];
   });
 }
 
