@@ -152,10 +152,10 @@ function Buttons({ box }) {
     class="button small" aria-pressed=${store.axes.value === axes} onClick=${() => (store.axes.value = axes)}
     title=${`Move and turn along the ${axes}'s axes (${command("axes").keys[0]})`}
   >${axes === "box" ? "Box axes" : "World axes"}</button>`;
-  /** @param {string} id @param {string} words @param {string} [more] */
-  const button = (id, words, more = "") => {
+  /** @param {string} id @param {string} words */
+  const button = (id, words) => {
     const { keys, run, title, when } = command(id);
-    return html`<button class=${`button small ${more}`} title=${`${title} (${keys[0]})`} disabled=${!(when?.() ?? true)} onClick=${run}>${words}</button>`;
+    return html`<button class="button small" title=${`${title} (${keys[0]})`} disabled=${!(when?.() ?? true)} onClick=${run}>${words}</button>`;
   };
   return html`<div class="box-buttons">
       <div class="joined" role="group" aria-label="Axes">${axesButton("box")}${axesButton("world")}</div>
@@ -166,7 +166,7 @@ function Buttons({ box }) {
       <${SnapButton} />
     </div>
     <div class="box-buttons">
-      ${button("ground", "Rest on ground")}${button("duplicate", "Duplicate")}
+      ${button("ground", "To ground")}${button("duplicate", "Duplicate")}
       ${button("lock", box.locked ? "Unlock" : "Lock")}${button("delete", "Delete")}
     </div>`;
 }

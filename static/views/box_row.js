@@ -37,11 +37,11 @@ export function BoxRow({ id, box, index, offset, visitors = [], renaming, onRena
         aria-label=${`Selected by ${person.name || "someone"}`} title=${`Selected by ${person.name || "someone"}`}
       >${initials(person.name)}</span>`,
     )}</span>`}
+    <span class="size muted" role="gridcell">${sizeText(box.size)}</span>
     <span class="lock-cell" role="gridcell">
       <${RowButton} class="lock" icon=${box.locked ? "lock" : "lock-open"} pressed=${box.locked} label=${`Lock ${box.name}`}
         title=${box.locked ? "Unlock (K)" : "Lock (K)"} run=${() => toggleLock(box)} />
     </span>
-    <span class="size muted" role="gridcell">${sizeText(box.size)}</span>
     <span role="gridcell">
       <${RowButton} class="eye" icon=${isHidden ? "eye-off" : "eye"} pressed=${isHidden} label=${`Hide ${box.name}`}
         title=${isHidden ? "Show on this page (H)" : "Hide on this page (H)"} run=${() => toggleHidden(box.id)} />
@@ -67,6 +67,7 @@ function RowButton({ class: name, icon, label, title, pressed, run }) {
 /** @param {{box: import("../store.js").Box, onDone: () => void}} props */
 function RenameField({ box, onDone }) {
   const input = useRef(/** @type {HTMLInputElement | null} */ (null));
+  const typed = useSignal(box.name);
   const problem = useSignal(/** @type {string | null} */ (null));
   const leaving = useRef(false);
   useLayoutEffect(() => {
@@ -78,8 +79,8 @@ function RenameField({ box, onDone }) {
     onDone();
   };
   const keep = async () => {
-    if (leaving.current || input.current === null) return;
-    const wanted = input.current.value.trim();
+    if (leaving.current) return;
+    const wanted = typed.value.trim();
     if (wanted === box.name) return leave();
     if (wanted === "") return void (problem.value = "A box needs a name; Escape keeps the old one.");
     try {
@@ -90,9 +91,12 @@ function RenameField({ box, onDone }) {
     }
   };
   return html`<input
-      class="field rename" aria-label=${`Name of ${box.name}`} maxlength="200" value=${box.name} ref=${input} spellcheck=${false}
+      class="field rename" aria-label=${`Name of ${box.name}`} maxlength="200" value=${typed.value} ref=${input} spellcheck=${false}
       aria-invalid=${problem.value !== null} onBlur=${keep}
-      onInput=${() => (problem.value = null)}
+      onInput=${(/** @type {any} */ event) => {
+        typed.value = event.currentTarget.value;
+        problem.value = null;
+      }}
       onClick=${(/** @type {Event} */ event) => event.stopPropagation()}
       onDblClick=${(/** @type {Event} */ event) => event.stopPropagation()}
       onKeyDown=${(/** @type {KeyboardEvent} */ event) => {
