@@ -1,0 +1,53 @@
+"""Makes docs/workspace.png, the README's picture, in a real browser: python docs/workspace.py
+
+Needs what `make test` needs. The picture is of the demo's session, at the mug, with nothing drawn in afterwards.
+"""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from playwright.sync_api import sync_playwright
+
+PICTURE = Path(__file__).with_name("workspace.png")
+SIZE = {"width": 1440, "height": 900}
+FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+
+
+def main() -> None:
+    """Serve the demo from a folder that is thrown away, and take the picture."""
+    chromium = os.environ.get("ARS_WEB_CHROMIUM") or shutil.which("chromium") or shutil.which("google-chrome")
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, "-m", "ars_web", "demo", "--sessions", folder, "--no-browser"]
+        server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        try:
+            login = next(found[0] for line in server.stdout if (found := re.search(r"http://\S+/login\?\S+", line)))
+            with sync_playwright() as playwright:
+                browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
+                take(browser.new_page(viewport=SIZE, color_scheme="dark"), login)
+                browser.close()
+        finally:
+            server.terminate()
+            server.wait()
+
+
+def take(page, login: str) -> None:
+    """Stand at a frame with the mug selected, its face handles shown, and take the picture."""
+    page.add_init_script("localStorage.setItem('ars-web.hints-seen', '1')")
+    page.goto(login)
+    page.locator(".stage .cover").wait_for(state="detached", timeout=120_000)
+    page.get_by_role("grid", name="Boxes").get_by_text("mug", exact=True).click()
+    page.evaluate("import('/static/store.js').then((store) => store.actions.enterFrame(26))")
+    page.wait_for_function("import('/static/store.js').then((store) => store.entered.value === 26)", timeout=60_000)
+    page.keyboard.press("s")
+    page.wait_for_function("document.querySelectorAll('.telling img').length === 0 || [...document.images].every((i) => i.complete)")
+    page.wait_for_timeout(4000)  # thumbnails and the photo, drawn in software
+    page.screenshot(path=PICTURE)
+
+
+if __name__ == "__main__":
+    main()
