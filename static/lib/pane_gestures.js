@@ -35,6 +35,8 @@ export function watchGestures(element, gestures) {
   /** @type {{drag: Drag | null, start: Place, panning: boolean, pinched: boolean} | null} */
   let press = null;
   let space = false;
+  /** Where a pointer was last, to fractions of a pixel, which a wheel does not tell. @type {Place} */
+  let pointer = { x: NaN, y: NaN };
 
   /** @param {MouseEvent} event @returns {Place} */
   const placeOf = (event) => {
@@ -63,6 +65,7 @@ export function watchGestures(element, gestures) {
   function moved(event) {
     const at = placeOf(event);
     const before = down.get(event.pointerId);
+    pointer = at;
     gestures.hover(at, event.pointerType === "touch");
     if (before === undefined || press === null) return;
     if (down.size === 2) {
@@ -112,7 +115,8 @@ export function watchGestures(element, gestures) {
     event.preventDefault();
     const turn = event.deltaMode === WheelEvent.DOM_DELTA_PIXEL ? event.deltaY : event.deltaY * LINE;
     // Browsers tell a pinch on a touch pad as a wheel with Ctrl, in small numbers.
-    gestures.magnify(Math.exp(-turn * (event.ctrlKey ? 0.01 : 0.0018)), placeOf(event));
+    const at = placeOf(event);
+    gestures.magnify(Math.exp(-turn * (event.ctrlKey ? 0.01 : 0.0018)), distance(at, pointer) < 2 ? pointer : at);
   }
 
   /** @param {KeyboardEvent} event */

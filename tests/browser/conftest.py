@@ -10,7 +10,7 @@ from typing import Any
 
 import httpx
 import pytest
-from playwright.sync_api import Browser, Page, Route, sync_playwright
+from playwright.sync_api import Browser, Page, Route, expect, sync_playwright
 
 from ars_web.demo.truth import DemoTruth
 from ars_web.recordings.recording import RecordedBox
@@ -36,6 +36,7 @@ def browser() -> Iterator[Browser]:
     """The Chromium that ARS_WEB_CHROMIUM names, else the system's, else Playwright's own."""
     names = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
     system = next((path for name in names if (path := shutil.which(name))), None)
+    expect.set_options(timeout=30_000)  # what must come about is waited for, however busy the machine is
     with sync_playwright() as playwright:
         launched = playwright.chromium.launch(
             executable_path=os.environ.get("ARS_WEB_CHROMIUM") or system, args=FLAGS, headless=True

@@ -3,6 +3,7 @@
 import re
 from itertools import combinations
 
+import httpx
 import numpy as np
 import pytest
 from playwright.sync_api import Locator, Page, expect
@@ -252,3 +253,75 @@ def test_the_film_strip_is_for_the_pane_at_hand(boxed_session, open_flatly) -> N
         thumbnail.click()
         expect(right).to_have_value("1")
         expect(left).to_have_value(was)
+
+
+def test_a_click_is_where_it_is_at_any_zoom(demo_recording: DemoTruth, boxed_session, open_flatly) -> None:
+    """As the server is told it, which draws the curve in the other frame."""
+    image = (demo_recording.camera.width, demo_recording.camera.height)
+    goal = np.array([301.3, 127.6])
+    with open_flatly(*boxed_session) as workspace:
+        page = workspace.page
+        page.keyboard.press("p")
+        pane(page, "Right").wait_for()
+        show(page, "Left", 2)
+        show(page, "Right", 5)
+
+        def told(act) -> np.ndarray:
+            with page.expect_request(re.compile("/frames/5/epipolar")) as request:
+                act()
+            address = httpx.URL(request.value.url)
+            return np.array([float(address.params["x"]), float(address.params["y"])])
+
+        x, y = place_of(page, "Left", goal, image)
+        coarse = told(lambda: page.mouse.click(x, y))
+        assert np.abs(coarse - goal).max() < 1.2  # the pane is smaller than the image
+        page.keyboard.press("Backspace")
+        page.mouse.move(x, y)
+        for _ in range(30):
+            page.mouse.wheel(0, -200)
+        expect(page.get_by_role("button", name="32x")).to_be_visible()  # and no further
+        # What was under the pointer still is, and a pixel of the pane is now a 32nd of the image's.
+        assert np.abs(told(lambda: page.mouse.click(x, y)) - coarse).max() < 1 / 32
+        page.keyboard.press("Backspace")
+        assert np.abs(told(lambda: page.mouse.click(x + 16, y)) - coarse - [0.5, 0.0]).max() < 1 / 32
+        page.keyboard.press("Backspace")
+        # A drag on the image takes it along, and marks nothing.
+        page.mouse.move(x, y)
+        page.mouse.down()
+        page.mouse.move(x + 40, y + 64)
+        page.mouse.up()
+        expect(card(page, 0)).to_contain_text("not marked")
+        assert np.abs(told(lambda: page.mouse.click(x, y)) - coarse - [-40 / 32, -2.0]).max() < 1 / 32
+        # Arrows move the mark by a pixel, by ten, by a tenth.
+        before = told(lambda: page.keyboard.press("Shift+ArrowDown"))
+        assert np.abs(told(lambda: page.keyboard.press("ArrowRight")) - before - [1, 0]).max() < 1e-6
+        assert np.abs(told(lambda: page.keyboard.press("Alt+ArrowUp")) - before - [1, -0.1]).max() < 1e-6
+
+
+def test_fingers_zoom_pan_and_mark(demo_recording: DemoTruth, boxed_session, open_flatly) -> None:
+    image = (demo_recording.camera.width, demo_recording.camera.height)
+    with open_flatly(*boxed_session, has_touch=True) as workspace:
+        page = workspace.page
+        page.keyboard.press("p")
+        pane(page, "Right").wait_for()
+        show(page, "Left", 2)
+        x, y = place_of(page, "Left", np.array(image) / 2, image)
+        fingers = page.context.new_cdp_session(page)
+
+        def touch(kind: str, *places: tuple[float, float]) -> None:
+            points = [{"x": px, "y": py, "id": i} for i, (px, py) in enumerate(places)]
+            fingers.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+        touch("touchStart", (x - 20, y))
+        touch("touchStart", (x - 20, y), (x + 20, y))
+        touch("touchMove", (x - 40, y), (x + 40, y))
+        touch("touchMove", (x - 80, y), (x + 80, y))
+        touch("touchEnd", (x - 80, y))
+        touch("touchEnd")
+        box = pane(page, "Left").bounding_box()
+        assert box is not None
+        whole = min(box["width"] / image[0], box["height"] / image[1])
+        expect(page.get_by_role("button", name=f"{4 * whole:.1f}x")).to_be_visible()
+        expect(card(page, 0)).to_contain_text("not marked")
+        page.touchscreen.tap(x, y)
+        expect(card(page, 0)).to_contain_text("1 of 2 frames")
