@@ -119,11 +119,11 @@ export function ChoiceField({ option, value, labelledBy, describedBy, invalid })
     ${option.choices.map(
       (choice) => html`<label key=${choice.value} class="choice">
         <input
-          type="radio" name=${option.name} value=${choice.value} checked=${choice.value === value}
+          type="radio" aria-label=${capital(choice.value)} aria-describedby=${`${describedBy.split(" ")[0]}-${choice.value}`} name=${option.name} value=${choice.value} checked=${choice.value === value}
           onChange=${() => setOption(option.name, choice.value)}
         />
         <span><span class="name">${capital(choice.value)}</span>${choice.value === option.default && html` <span class="default">default</span>`}
-          <span class="meaning">${choice.meaning}</span></span>
+          <span class="meaning" id=${`${describedBy.split(" ")[0]}-${choice.value}`}>${choice.meaning}</span></span>
       </label>`,
     )}
   </div>`;

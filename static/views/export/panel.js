@@ -67,11 +67,17 @@ function Formats() {
   return html`<div class="formats" role="radiogroup" aria-label="Format">
     ${writers.value.map(
       (writer) => html`<label key=${writer.format} class="card format" data-chosen=${writer.format === format.value}>
-        <input type="radio" name="format" value=${writer.format} checked=${writer.format === format.value} onChange=${() => (format.value = writer.format)} />
-        <span><strong>${writer.title}</strong><span class="meaning">${writer.description}</span></span>
+        <input type="radio" name="format" aria-label=${writer.title} aria-describedby=${`format-${writer.format}`} value=${writer.format} checked=${writer.format === format.value} onChange=${() => (format.value = writer.format)} />
+        <span><strong>${writer.title}</strong><span class="meaning" id=${`format-${writer.format}`}>${writer.description}</span></span>
       </label>`,
     )}
   </div>`;
+}
+
+/** Go to what has to be set right first. */
+function toWrong() {
+  const wrong = document.querySelector('.option :is(input[aria-invalid="true"], [aria-invalid="true"] input:checked)');
+  if (wrong instanceof HTMLElement) wrong.focus();
 }
 
 function Start() {
@@ -80,7 +86,8 @@ function Start() {
   const held = !isSound.value || refusals.value.size > 0 || format.value === "";
   const frames = isCurrent.value ? forecast.value?.frames : undefined;
   const start = async () => {
-    if (held || starting.value) return;
+    if (held) return toWrong();
+    if (starting.value) return;
     starting.value = true;
     problem.value = null;
     try {
