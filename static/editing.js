@@ -20,7 +20,7 @@ const QUIET = 350;
 let tell = () => {};
 /** Changes under way, by what they change. @type {Map<string, Promise<unknown>>} */
 const queues = new Map();
-/** @type {{id: number, place: Place, from: Box, timer: ReturnType<typeof setTimeout>} | null} */
+/** @type {{id: number, place: Place, from: Box, timer: ReturnType<typeof setTimeout> | undefined} | null} */
 let held = null;
 
 /** @param {(message: object) => void} send to the scene, over the live line */
@@ -88,9 +88,11 @@ export async function changeBox(id, changes) {
  * @returns {Promise<Box>}
  */
 async function stored(id, changes) {
+  // What it was made to, also once others have been at it while the server was away: their edit is not to be lost.
+  const { revision } = existing(id);
   for (let repeated = false; ; repeated = true) {
     try {
-      return await api.changeBox(store.sid.value, id, existing(id).revision, changes);
+      return await api.changeBox(store.sid.value, id, revision, changes);
     } catch (error) {
       if (!(error instanceof api.ApiError)) throw error;
       // The first attempt may have been stored, and only its answer lost.
@@ -121,8 +123,8 @@ function lineIs(state) {
   });
 }
 
-/** @param {number} id @param {Place} place */
-export function editBox(id, place) {
+/** @param {number} id @param {Place} place @param {boolean} [hold] store it only by `finishEdit`: a button is held */
+export function editBox(id, place, hold = false) {
   if (held !== null && held.id !== id) void finishEdit();
   const from = held?.from ?? existing(id);
   if (from.locked) {
@@ -130,7 +132,7 @@ export function editBox(id, place) {
     return;
   }
   if (held !== null) clearTimeout(held.timer);
-  held = { id, place, from, timer: setTimeout(() => void finishEdit(), QUIET) };
+  held = { id, place, from, timer: hold ? undefined : setTimeout(() => void finishEdit(), QUIET) };
   showPreview({ box_id: id, ...place });
 }
 
@@ -244,6 +246,8 @@ export async function stepHistory(which) {
   } catch (error) {
     if (!(error instanceof api.ApiError)) throw error;
     store.setProblem("history", error.message);
+    // Somebody else changed the same thing since: the history says who, and what of it stands.
+    if (error.current !== undefined) store.sidePanel.value = "history";
   }
 }
 

@@ -127,8 +127,9 @@ export function setProblem(place, text) {
  * @typedef {object} Actions
  *
  * @property {(id: number, changes: Partial<Pick<Box, "class_id" | "name" | "locked" | "T_world_box" | "size">>) => Promise<void>} changeBox
- * @property {(id: number, place: {T_world_box: Transform, size: [number, number, number]}) => void} editBox
- *   shown at once, everywhere; stored once nothing more came for a moment: for held keys and stepped fields
+ * @property {(id: number, place: {T_world_box: Transform, size: [number, number, number]}, hold?: boolean) => void} editBox
+ *   shown at once, everywhere; stored once nothing more came for a moment: for held keys and stepped fields; with
+ *   `hold` only by `finishEdit`, when the button is let go
  * @property {() => Promise<void>} finishEdit store now what `editBox` holds back
  * @property {(translate: [number, number, number], rotate: [number, number, number]) => void} nudge
  *   the selected box by metres and degrees along the axes that are set

@@ -26,7 +26,7 @@ const STILL = 3;
  * @property {boolean} [locked] it can be read, and not changed
  * @property {(value: number) => string | null} [wrong] why a value cannot be, in words
  * @property {(value: number) => Promise<void>} onCommit a value was typed; rejects with what is wrong
- * @property {(value: number) => void} onStep
+ * @property {(value: number, hold: boolean) => void} onStep `hold`: a button is held, and `onStepped` follows
  * @property {() => void} onStepped the last step of several is done
  * @property {() => void} [onLeave] Escape, where there was nothing to restore
  */
@@ -78,11 +78,11 @@ export function NumberField(props) {
       problem.value = /** @type {Error} */ (error).message;
     }
   };
-  /** @param {number} next */
-  const stepTo = (next) => {
+  /** @param {number} next @param {boolean} hold */
+  const stepTo = (next, hold) => {
     if (!allowed(next)) return;
     draft.value = null;
-    newest.current.onStep(next);
+    newest.current.onStep(next, hold);
   };
 
   /** @param {KeyboardEvent} event */
@@ -98,7 +98,7 @@ export function NumberField(props) {
       event.preventDefault();
       event.stopPropagation();
       const from = current();
-      if (from !== null) stepTo(tidy(from + (event.key === "ArrowUp" ? 1 : -1) * step * times(event)));
+      if (from !== null) stepTo(tidy(from + (event.key === "ArrowUp" ? 1 : -1) * step * times(event)), false);
     }
   };
 
@@ -107,7 +107,7 @@ export function NumberField(props) {
       restore();
       return newest.current.value;
     },
-    move: (from, steps) => stepTo(tidy(from + steps * step)),
+    move: (from, steps) => stepTo(tidy(from + steps * step), true),
     end: () => newest.current.onStepped(),
     click: () => input.current?.focus(),
   });

@@ -89,7 +89,7 @@ function Numbers({ box }) {
               key=${tone} label=${`${row} ${ROWS[row].names[axis]}`} letter=${ROWS[row].letters[axis]} tone=${tone}
               title=${ROWS[row].title} locked=${box.locked} value=${values[row][axis]} ...${LOOKS[row]}
               onCommit=${(/** @type {number} */ value) => commit(row, axis, value)}
-              onStep=${(/** @type {number} */ value) => store.actions.editBox(box.id, changed(row, axis, value))}
+              onStep=${(/** @type {number} */ value, /** @type {boolean} */ hold) => store.actions.editBox(box.id, changed(row, axis, value), hold)}
               onStepped=${() => void store.actions.finishEdit()} onLeave=${focusList}
             />`,
           )}
