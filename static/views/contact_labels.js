@@ -34,9 +34,10 @@ export class ContactLabels {
     return this.#known.get(frame)?.drawn ?? null;
   }
 
-  /** Whether a frame's answer is there and of the boxes as they are now. @param {number} frame */
-  isFresh(frame) {
-    return this.#known.get(frame)?.of === this.#state;
+  /** How many of these have no answer of the boxes as they are now. @param {readonly number[]} frames */
+  countMissing(frames) {
+    const state = this.#state;
+    return frames.reduce((sum, frame) => sum + (this.#known.get(frame)?.of === state ? 0 : 1), 0);
   }
 
   /**

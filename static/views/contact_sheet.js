@@ -38,7 +38,7 @@ export function ContactSheet() {
     () => (only ? all.filter((index) => labels.of(index)?.some((one) => one.boxId === box.id && one.inImage)) : all),
     [all, only, box?.id, told],
   );
-  const unchecked = only ? all.filter((index) => !labels.isFresh(index)).length : 0;
+  const unchecked = only ? labels.countMissing(all) : 0;
 
   const room = Math.max(0, place.width - 2 * PADDING);
   const columns = Math.max(1, Math.floor((room + GAP) / (wish + GAP)));
