@@ -105,7 +105,7 @@
     if (told.ars === "fit") fit();
     if (told.ars !== "view") return;
     if (told.mode === "scene" || told.mode === "frame") view.mode = told.mode;
-    if (typeof told.blend === "number") view.blend = Math.min(1, Math.max(0, told.blend)) || 0;
+    if (Number.isFinite(told.blend)) view.blend = Math.min(1, Math.max(0, told.blend));
     if (typeof told.dark === "boolean") document.documentElement.classList.toggle("ars-light", !told.dark);
   });
 
@@ -202,11 +202,12 @@
   addEventListener(
     "pointerdown",
     (event) => {
+      // viser calls it from a passive listener when a handle is pressed, where it does nothing but log an error.
+      event.preventDefault = () => {};
       if (view.mode !== "frame" || pan !== null || event.button > 2) return;
       if (!(space && event.button === 0) && event.button === 0) return; // viser first: a handle, an arrow, a click
       beginPan(event);
       event.stopImmediatePropagation();
-      event.preventDefault();
     },
     true,
   );
@@ -244,6 +245,7 @@
   }
   addEventListener("pointerup", endPan, true);
   addEventListener("pointercancel", endPan, true);
+  addEventListener("mousedown", (event) => view.mode === "frame" && event.button === 1 && event.preventDefault(), true);
   addEventListener("contextmenu", (event) => view.mode === "frame" && event.preventDefault(), true);
   addEventListener("dblclick", () => view.mode === "frame" && fit(), true);
 

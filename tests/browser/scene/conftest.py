@@ -1,11 +1,13 @@
 """viser's own page with our bridge in it, in an iframe of a page that listens, and the Python side of that browser."""
 
 import json
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import rich
 import viser
@@ -26,11 +28,11 @@ READY = """() => {
 
 def wait_until(condition: Callable[[], Any], *, page: Page | None = None, seconds: float = 20.0) -> None:
     """Wait for a condition; with a `page`, its events are served meanwhile."""
-    deadline = time.monotonic() + seconds
+    deadline, pause = time.monotonic() + seconds, threading.Event()
     while not condition():
         assert time.monotonic() < deadline, "the condition did not come about"
         if page is None:
-            time.sleep(0.01)
+            pause.wait(0.01)
         else:
             page.wait_for_timeout(10)
 
@@ -97,6 +99,38 @@ class ScenePage:
             " return node === undefined ? null : what.split('.').reduce((part, key) => part[key], node); }",
             [name, what],
         )
+
+    def pose(self, name: str) -> tuple[list[float], list[float]] | None:
+        """Position and wxyz of a node as the browser has them; None: it has no such node."""
+        found = self.scene.evaluate("(name) => window.__viserMutable.nodePoseData[name] ?? null", name)
+        return None if found is None else (found["position"], found["wxyz"])
+
+    def camera_place(self) -> list[float]:
+        """Where the browser's camera is and how it is turned."""
+        return self.scene.evaluate(
+            "() => { const { camera } = window.__viserMutable;"
+            " return [...camera.position.toArray(), ...camera.quaternion.toArray()]; }"
+        )
+
+    def look(self, eye: Any, at: Any) -> None:
+        """Put the free camera somewhere, and wait until it is there."""
+        before = self.camera_place()
+        with self.client.atomic():
+            self.client.camera.position = np.array(eye, dtype=float)
+            self.client.camera.look_at = np.array(at, dtype=float)
+        self.client.flush()
+        wait_until(lambda: self.camera_place() != before, page=self.page)
+        self.settle()
+
+    def drag(self, start: tuple[float, float], end: tuple[float, float], *, steps: int = 8) -> None:
+        """Press at one place of the screen, move to another in steps, and hold."""
+        mouse = self.page.mouse
+        mouse.move(*start)
+        self.settle()  # what the pointer is over is known once it has been drawn
+        mouse.down()
+        for i in range(1, steps + 1):
+            mouse.move(*(a + (b - a) * i / steps for a, b in zip(start, end, strict=True)))
+            self.page.wait_for_timeout(30)
 
     def screen_of(self, point_world: Any) -> tuple[float, float]:
         """Where a point of the world is on the screen, CSS pixels, as the browser's camera sees it."""
