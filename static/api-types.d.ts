@@ -756,6 +756,28 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/sessions/{sid}/exports/preview": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Preview
+         * @description What an export would write of the session as it is now: the counts that its report then has.
+         *
+         *     Nothing is written, so a repeat is harmless. Long sessions take seconds; who hangs up stops the work.
+         */
+        post: operations["exports-preview"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/exports/{export_id}": {
         parameters: {
             query?: never;
@@ -770,7 +792,11 @@ export interface paths {
         get: operations["exports-get"];
         put?: never;
         post?: never;
-        delete?: never;
+        /**
+         * Delete
+         * @description Delete an export that has ended, and its dataset. It cannot change any more, so no `If-Match` is needed.
+         */
+        delete: operations["exports-delete"];
         options?: never;
         head?: never;
         patch?: never;
@@ -808,6 +834,26 @@ export interface paths {
          * @description The finished dataset as one zip, written while it is sent.
          */
         get: operations["exports-download"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/formats": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Formats
+         * @description The formats of recordings and of datasets, with the options of exports in words.
+         */
+        get: operations["formats-list"];
         put?: never;
         post?: never;
         delete?: never;
@@ -1059,6 +1105,16 @@ export interface components {
             distortion: number[];
         };
         /**
+         * ChoiceJson
+         * @description One value that an option can have.
+         */
+        ChoiceJson: {
+            /** Value */
+            value: string;
+            /** Meaning */
+            meaning: string;
+        };
+        /**
          * ClassAnswer
          * @description A class; its ETag is its revision.
          */
@@ -1285,6 +1341,16 @@ export interface components {
              * Format: date-time
              */
             created: string;
+            /**
+             * Ended
+             * @description when it was done, failed or cancelled; null until then
+             */
+            ended: string | null;
+            /**
+             * Bytes
+             * @description of all files of a done dataset, linked images too: what a download holds
+             */
+            bytes: number | null;
         };
         /**
          * ExportOptions
@@ -1314,13 +1380,13 @@ export interface components {
             shape?: ("box" | "hull" | "mesh") | null;
             /**
              * Smallest visible share
-             * @description labels of objects that nearer boxes hide more than this leaves are dropped; 0 keeps all
+             * @description labels of which less than this is visible, nearer boxes hiding the rest, are dropped; 0 keeps all
              * @default 0
              */
             min_visible: number;
             /**
              * Largest share outside
-             * @description labels of objects that are outside the image by more than this are dropped; 1 keeps all
+             * @description labels of which more than this lies outside the image are dropped; 1 keeps all
              * @default 1
              */
             max_truncated: number;
@@ -1342,7 +1408,7 @@ export interface components {
             split: components["schemas"]["SplitChoice"];
             /**
              * Merge with
-             * @description ids of further sessions in the same dataset; classes are matched by name
+             * @description further sessions in the same dataset; classes are matched by name
              * @default []
              */
             sessions: string[];
@@ -1424,6 +1490,53 @@ export interface components {
              * @description whether there are more folders than are listed
              */
             more: boolean;
+        };
+        /**
+         * Forecast
+         * @description What an export would write of the sessions as they are.
+         */
+        Forecast: {
+            /** Format */
+            format: string;
+            options: components["schemas"]["ExportOptions"];
+            /** Frames */
+            frames: number;
+            /** Sessions */
+            sessions: components["schemas"]["SessionUsed"][];
+            /** Classes */
+            classes: components["schemas"]["ClassUsed"][];
+            /** Splits */
+            splits: {
+                [key: string]: components["schemas"]["SplitCounts"];
+            };
+            /**
+             * Dropped
+             * @description boxes of frames without a label, by the first rule that applied
+             */
+            dropped: {
+                [key: string]: number;
+            };
+            images: components["schemas"]["ImageCounts"];
+            /**
+             * Image Bytes
+             * @description of all images, linked ones too: about what a download holds
+             */
+            image_bytes: number;
+            /**
+             * New Bytes
+             * @description of the images that are not linked: about what the dataset takes on the disk
+             */
+            new_bytes: number;
+        };
+        /**
+         * FormatsJson
+         * @description All formats, in the order in which they are offered.
+         */
+        FormatsJson: {
+            /** Readers */
+            readers: components["schemas"]["ReaderJson"][];
+            /** Writers */
+            writers: components["schemas"]["WriterJson"][];
         };
         /**
          * FrameChoice
@@ -1522,6 +1635,25 @@ export interface components {
             can_undo: components["schemas"]["EditName"] | null;
             /** @description the undo that the caller's redo would take back */
             can_redo: components["schemas"]["EditName"] | null;
+        };
+        /**
+         * ImageCounts
+         * @description How the images get into the dataset. One that its Exif asks viewers to turn is encoded, too; that is seen only
+         *     when it is written.
+         */
+        ImageCounts: {
+            /**
+             * Linked
+             * @description the same file under a second name, which takes no room
+             */
+            linked: number;
+            /** Copied */
+            copied: number;
+            /**
+             * Encoded
+             * @description written anew: undistorted, or in the encoding that the format needs
+             */
+            encoded: number;
         };
         /**
          * ImportDraft
@@ -1864,6 +1996,43 @@ export interface components {
             y: number;
         };
         /**
+         * OptionJson
+         * @description An export option.
+         */
+        OptionJson: {
+            /**
+             * Name
+             * @description as in the options' JSON; split.train is train in the object split
+             */
+            name: string;
+            /** Title */
+            title: string;
+            /** Meaning */
+            meaning: string;
+            /**
+             * Type
+             * @description of its value; integers and texts are lists
+             * @enum {string}
+             */
+            type: "integer" | "number" | "choice" | "integers" | "texts";
+            /**
+             * Optional
+             * @description whether it may be null, which then is its default
+             */
+            optional: boolean;
+            /**
+             * Choices
+             * @description of a choice; empty for others
+             */
+            choices: components["schemas"]["ChoiceJson"][];
+            /** Default */
+            default: unknown;
+            /** Minimum */
+            minimum: number | null;
+            /** Maximum */
+            maximum: number | null;
+        };
+        /**
          * PastEdit
          * @description One entry of the session's history, as it stands now.
          */
@@ -2059,6 +2228,21 @@ export interface components {
              * @description share of the amodal outline's area outside the image
              */
             truncated: number;
+        };
+        /**
+         * ReaderJson
+         * @description A format that recordings come in.
+         */
+        ReaderJson: {
+            /** Format */
+            format: string;
+            /** Title */
+            title: string;
+            /**
+             * Needs
+             * @description which files
+             */
+            needs: string;
         };
         /**
          * RectifiedCamera
@@ -2345,6 +2529,25 @@ export interface components {
              * @description in the zip
              */
             files: number;
+        };
+        /**
+         * WriterJson
+         * @description A format that datasets go out in.
+         */
+        WriterJson: {
+            /** Format */
+            format: string;
+            /** Title */
+            title: string;
+            /** Description */
+            description: string;
+            /**
+             * Shapes
+             * @description what its labels can be drawn round
+             */
+            shapes: string[];
+            /** Options */
+            options: components["schemas"]["OptionJson"][];
         };
         /**
          * ConflictedMessage
@@ -7101,6 +7304,116 @@ export interface operations {
             };
         };
     };
+    "exports-preview": {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description a repeat with the same key answers what the first answered, and does nothing */
+                "idempotency-key"?: string | null;
+            };
+            path: {
+                sid: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ExportDraft"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Forecast"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the thing is not in a state that allows this */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description beyond a limit, which the detail names */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     "exports-get": {
         parameters: {
             query?: never;
@@ -7141,6 +7454,98 @@ export interface operations {
             };
             /** @description a thing named in the path is not there */
             404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "exports-delete": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                export_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the thing is not in a state that allows this */
+            409: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -7332,6 +7737,80 @@ export interface operations {
             };
             /** @description the thing is not in a state that allows this */
             409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "formats-list": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["FormatsJson"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
                 headers: {
                     [name: string]: unknown;
                 };

@@ -124,5 +124,5 @@ class ExportOptions(_Strict):
     sessions: tuple[str, ...] = Field(
         (),
         title="Merge with",
-        description="ids of further sessions in the same dataset; classes are matched by name",
+        description="further sessions in the same dataset; classes are matched by name",
     )
