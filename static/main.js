@@ -1,7 +1,7 @@
 /** Joins the server's answers and the views. */
 
 import * as api from "./api.js";
-import { press } from "./commands.js";
+import { press } from "./views/commands.js";
 import * as editing from "./editing.js";
 import { followTheme } from "./lib/theme.js";
 import { effect, h, render } from "./lib/view.js";

@@ -1,6 +1,6 @@
 /** What can be done to one box of the list. What goes wrong is shown at the box. */
 
-import { command } from "../commands.js";
+import { command } from "./commands.js";
 import * as store from "../store.js";
 
 /** @typedef {import("../store.js").Box} Box */

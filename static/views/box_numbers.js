@@ -1,6 +1,6 @@
 /** The selected box: its class, its place and size as numbers, and what can be done to it. */
 
-import { command } from "../commands.js";
+import { command } from "./commands.js";
 import { NumberField } from "../lib/number_field.js";
 import { fixed, millimetres, trimmed } from "../lib/quantity.js";
 import { anglesOfWxyz, wxyzOfAngles } from "../lib/rotation.js";

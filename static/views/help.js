@@ -1,6 +1,6 @@
 /** The list of keys. */
 
-import { commands } from "../commands.js";
+import { commands } from "./commands.js";
 import { Dialog } from "../lib/dialog.js";
 import { Icon } from "../lib/icon.js";
 import { html } from "../lib/view.js";

@@ -1,6 +1,6 @@
 /** Everything that was done in the session, newest first: by whom, when, and what of it stands. */
 
-import { command } from "../commands.js";
+import { command } from "./commands.js";
 import { Icon } from "../lib/icon.js";
 import { ago } from "../lib/time.js";
 import { html, useEffect, useRef, useSignal } from "../lib/view.js";

@@ -1,6 +1,6 @@
 /** Making boxes: of the class used last or a chosen one, and, where there are none yet, the ways to make one. */
 
-import { command } from "../commands.js";
+import { command } from "./commands.js";
 import { Icon } from "../lib/icon.js";
 import { Menu } from "../lib/menu.js";
 import { html, useRef, useSignal } from "../lib/view.js";

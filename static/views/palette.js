@@ -1,6 +1,6 @@
 /** The command palette: every command by its name; a number goes to that frame, a name selects that box. */
 
-import { commands } from "../commands.js";
+import { commands } from "./commands.js";
 import { Dialog } from "../lib/dialog.js";
 import { html, useSignal } from "../lib/view.js";
 import * as store from "../store.js";

@@ -1,6 +1,6 @@
 /** The right panel: the boxes and the selected one's numbers, or the history; the way on at the bottom. */
 
-import { command } from "../commands.js";
+import { command } from "./commands.js";
 import { html } from "../lib/view.js";
 import * as store from "../store.js";
 import { BoxNumbers } from "./box_numbers.js";

@@ -1,6 +1,6 @@
 /** Whether drags snap, and to what. */
 
-import { command } from "../commands.js";
+import { command } from "./commands.js";
 import { Icon } from "../lib/icon.js";
 import { Popover } from "../lib/popover.js";
 import { parseQuantity, trimmed } from "../lib/quantity.js";

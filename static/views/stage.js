@@ -1,6 +1,6 @@
 /** The centre: viser's scene in a frame of the same origin, and what lies over it. */
 
-import { command, press } from "../commands.js";
+import { command, press } from "./commands.js";
 import { Icon } from "../lib/icon.js";
 import { html, useEffect, useRef, useSignal, useSignalEffect } from "../lib/view.js";
 import * as store from "../store.js";

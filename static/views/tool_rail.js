@@ -1,6 +1,6 @@
 /** The tools, one key each. */
 
-import { command } from "../commands.js";
+import { command } from "./commands.js";
 import { Icon } from "../lib/icon.js";
 import { html } from "../lib/view.js";
 import * as store from "../store.js";

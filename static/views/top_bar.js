@@ -1,6 +1,6 @@
 /** The top bar: where one is, the modes, what is saved, who else is here, undo and help. */
 
-import { command } from "../commands.js";
+import { command } from "./commands.js";
 import { Icon } from "../lib/icon.js";
 import { initials, personColor } from "../lib/person.js";
 import { html, useRef, useSignal } from "../lib/view.js";

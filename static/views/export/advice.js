@@ -3,7 +3,7 @@
 import { html } from "../../lib/view.js";
 import { boxes, classes, mode } from "../../store.js";
 import { changes, options, reset, setOption, valueOf } from "./draft.js";
-import { capital, many, REASONS } from "./words.js";
+import { many, REASONS } from "./words.js";
 
 /** @typedef {import("../../store.js").Schemas["Forecast"]} Forecast */
 /** @typedef {{id: string, text: string, remedy: {words: string, act: () => void} | null}} Warning */
@@ -68,7 +68,7 @@ function classesWithout(found, merged) {
     const [have, are] = unboxed.length === 1 ? ["has", "it is"] : ["have", "they are"];
     warnings.push({
       id: "class-without-box",
-      text: `${capital(listed(unboxed))} ${have} no box${merged ? " here" : ""} and would get no label, though ${are} among the classes.`,
+      text: `${listed(unboxed)} ${have} no box${merged ? " here" : ""} and would get no label, though ${are} among the classes.`,
       remedy: toScene("Place one in the scene"),
     });
   }
@@ -76,7 +76,7 @@ function classesWithout(found, merged) {
     const strict = options.value.filter(({ name }) => Object.values(REASONS).some(({ option }) => option === name) && changes.value.has(name));
     warnings.push({
       id: "class-without-label",
-      text: `${capital(listed(unseen))} would get no label: in every chosen frame the boxes are outside the image, hidden or too small.`,
+      text: `${listed(unseen)} would get no label: in every chosen frame the boxes are outside the image, hidden or too small.`,
       remedy: strict.length > 0 ? { words: "Keep every label", act: () => reset(strict.map(({ name }) => name)) } : null,
     });
   }

@@ -122,7 +122,7 @@ function Row({ one }) {
             html`<button class="button quiet icon-only" onClick=${() => (asking.value = true)} aria-label=${`Remove ${title}`} title="Remove"><${Icon} name="trash" size=${14} /></button>`}
       </span>
     </div>
-    <p class="muted">${words.length > 0 ? words.join(" · ") : "All options at their defaults"}</p>
+    <p class="muted">${words.length > 0 ? words.join("\u00a0· ") : "All options at their defaults"}</p>
     <${State} one=${one} />
     ${asking.value &&
     html`<div class="asking" role="group" aria-label="Remove this export">

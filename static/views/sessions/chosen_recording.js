@@ -4,7 +4,7 @@ import { plural } from "../../lib/plural.js";
 import { html, useEffect, useRef, useSignal } from "../../lib/view.js";
 import { actions } from "../../store.js";
 import { classes, lookAt, name, startImport } from "./draft.js";
-import { titleOf, useReaders } from "./known_recordings.js";
+import { KnownRecordings, readers, titleOf, useReaders } from "./known_recordings.js";
 import { SkippedTable } from "./skipped_frames.js";
 import { Thumbnail } from "./thumbnail.js";
 
@@ -38,11 +38,12 @@ export function ChosenRecording({ chosen }) {
             onInput=${(/** @type {any} */ event) => (name.value = event.currentTarget.value)} />
         </label>
         <label><span>${look.classes.length > 0 ? "More classes, separated by commas" : "Classes, separated by commas"}</span>
-          <input class="field" spellcheck=${false} value=${classes.value} placeholder="cube, dragon"
+          <input class="field" spellcheck=${false} value=${classes.value} placeholder="for example cube, dragon"
             onInput=${(/** @type {any} */ event) => (classes.value = event.currentTarget.value)} />
         </label>
         <${FormatChoice} chosen=${chosen} look=${look} />
       </div>`}
+    ${look === null && !looking && html`<${Unreadable} chosen=${chosen} />`}
     ${!(look === null && looking) && html`<${Elsewhere} chosen=${chosen} />`}
     ${look !== null &&
     look.skipped.count > 0 &&
@@ -95,6 +96,22 @@ function FormatChoice({ chosen, look }) {
   </label>`;
 }
 
+/** What can be done where it could not be read. @param {{chosen: import("./draft.js").Chosen}} props */
+function Unreadable({ chosen: { source, title } }) {
+  return html`<div class="unreadable">
+    <div class="row">
+      <button type="button" class="button" onClick=${() => void lookAt(source, title)}>Look again</button>
+      <label><span class="muted">Read it as</span>
+        <select class="field" value=${source.format} onChange=${(/** @type {any} */ event) => void lookAt({ ...source, format: event.currentTarget.value }, title)}>
+          <option value="auto">what it looks like</option>
+          ${readers.value.map((reader) => html`<option key=${reader.format} value=${reader.format}>${reader.title}</option>`)}
+        </select>
+      </label>
+    </div>
+    <${KnownRecordings} />
+  </div>`;
+}
+
 /** For formats that do not say where their images or their camera are. @param {{chosen: import("./draft.js").Chosen}} props */
 function Elsewhere({ chosen }) {
   const { source } = chosen;
@@ -123,7 +140,7 @@ function Elsewhere({ chosen }) {
       ${source.upload !== undefined && line("Folder or file of the recording", path, "all of the zip")}
       ${line("Image folder", images, "as the format implies")}
       ${line("Camera file", camera, "as the format implies")}
-      <button type="button" class="button" disabled=${chosen.looking} onClick=${again}>Look again</button>
+      <button type="button" class="button" disabled=${chosen.looking} onClick=${again}>Look there</button>
     </div>
     <p class="muted">Paths from the top of ${place}, with /.</p>
   </details>`;

@@ -126,5 +126,5 @@ function Formats({ formats }) {
 /** @param {{root: string, path: string, title: string}} props */
 function Choose({ root, path, title }) {
   const named = title.replace(/\.[^.]+$/, "");
-  return html`<button class="button" aria-label=${`Look at ${title}`} onClick=${() => void choose({ root, path, format: "auto" }, title, named || title)}>Look</button>`;
+  return html`<button class="button" aria-label=${`Choose ${title}`} onClick=${() => void choose({ root, path, format: "auto" }, title, named || title)}>Choose</button>`;
 }

@@ -3,7 +3,7 @@
 import { html, signal, useEffect } from "../../lib/view.js";
 import { actions } from "../../store.js";
 
-const readers = signal(/** @type {import("../../store.js").Schemas["ReaderJson"][]} */ ([]));
+export const readers = signal(/** @type {import("../../store.js").Schemas["ReaderJson"][]} */ ([]));
 
 /** What a format is called, once that is known. @param {string} format */
 export function titleOf(format) {

@@ -82,8 +82,11 @@ async function attempt(id, change) {
     await change();
     return true;
   } catch (error) {
+    const { status, message } = /** @type {Error & {status?: number}} */ (error);
     await refresh(); // what it met may be somebody's change
-    problems.value = new Map(problems.value).set(id, /** @type {Error} */ (error).message);
+    const wasChanged = status === 409 || status === 412;
+    const told = wasChanged ? "It was changed elsewhere meanwhile; this is how it is now. Try again if you still want to." : message;
+    problems.value = new Map(problems.value).set(id, told);
     return false;
   }
 }

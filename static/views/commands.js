@@ -1,6 +1,6 @@
 /** Everything frequent, once: what the keys, the palette, the key list and the tool rail all take from. */
 
-import * as store from "./store.js";
+import * as store from "../store.js";
 
 /**
  * @typedef {object} Command
@@ -29,12 +29,12 @@ function onBox(action) {
   );
 }
 
-/** @param {import("./store.js").Mode} mode */
+/** @param {import("../store.js").Mode} mode */
 function goMode(mode) {
   store.mode.value = mode;
 }
 
-/** @param {import("./store.js").Tool} tool */
+/** @param {import("../store.js").Tool} tool */
 function take(tool) {
   store.tool.value = tool;
   if (store.mode.value === "export") goMode("scene");
