@@ -8,7 +8,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from playwright.sync_api import Locator, Page, expect
+from playwright.sync_api import Locator, Page, Route, expect
 
 from ars_web.geometry.box import Box
 from ars_web.geometry.camera import Camera
@@ -120,7 +120,7 @@ def test_a_finished_export_has_the_figures_that_the_panel_showed(boxed_session, 
         assert shown["dropped"] == {reason: count for reason, count in job["report"]["dropped"].items() if count}
         said = rows(page, "done")
         expect(said).to_contain_text(
-            "Every N-th frame: 2 · Smallest visible share: 0.5 · Training: 0.6 · Validation: 0.4"
+            re.compile("Every N-th frame: 2.· Smallest visible share: 0.5.· Training: 0.6.· Validation: 0.4")
         )
         labels = sum(split["labels"] for split in job["report"]["splits"].values())
         expect(said).to_contain_text(f"{labels} labels · 3 training, 2 validation")
@@ -152,7 +152,7 @@ def test_a_running_export_is_cancelled_and_removed(long_session, open_flatly) ->
         expect(page.get_by_role("button", name="Remove YOLO")).to_be_visible()
         page.get_by_role("button", name="Remove YOLO").click()
         page.get_by_role("group", name="Remove this export").get_by_role("button", name="Remove").click()
-        expect(page.get_by_text("None yet.")).to_be_visible()
+        expect(page.get_by_text("None yet.")).to_be_visible(timeout=30_000)  # workers are waited for
         assert workspace.answer("/exports") == []
 
 
@@ -263,3 +263,30 @@ def test_figures_follow_edits_and_exports_of_others(boxed_session, open_flatly) 
         assert workspace.client.post(address, json={"format": "coco", "options": {}}).status_code == 202
         page.get_by_role("button", name="Look for new exports").click()
         expect(rows(page, "done")).to_contain_text("COCO", timeout=60_000)
+
+
+def test_a_newer_question_ends_the_older_and_old_figures_stay_meanwhile(boxed_session, open_flatly) -> None:
+    with open_flatly(*boxed_session) as workspace:
+        page = workspace.page
+        open_panel(page)
+        counted(page)
+        held: list[Route] = []
+
+        def hold(route: Route) -> None:
+            if '"step":2' in (route.request.post_data or ""):
+                held.append(route)
+            else:
+                route.continue_()
+
+        page.route("**/exports/preview", hold)
+        with page.expect_request(lambda request: '"step":2' in (request.post_data or "")):
+            field(page, "Every N-th frame").fill("2")
+        expect(forecast(page).get_by_role("status")).to_have_text("Counting…")
+        expect(forecast(page)).to_have_attribute("aria-busy", "true")
+        expect(forecast(page).locator(".figures")).to_have_attribute("data-stale", "true")
+        expect(forecast(page).locator('[data-count="frames"]')).to_have_text("9")
+        with page.expect_event("requestfailed", lambda request: '"step":2' in (request.post_data or "")):
+            field(page, "Every N-th frame").fill("3")
+        expect(forecast(page).locator('[data-count="frames"]')).to_have_text("3")
+        counted(page)
+        assert len(held) == 1

@@ -90,6 +90,8 @@ export function PastExports() {
 function Row({ one }) {
   const row = useRef(/** @type {HTMLLIElement | null} */ (null));
   const asking = useSignal(false);
+  /** Whether it is being cancelled or removed: workers may take seconds to stop. */
+  const busy = useSignal(false);
   const wrong = useSignal(/** @type {string | null} */ (null));
   useEffect(() => {
     if (newest.value !== one.id) return;
@@ -101,12 +103,16 @@ function Row({ one }) {
   const words = optionsWords(writer?.options ?? [], one.options);
   /** @param {(id: string) => Promise<unknown>} act */
   const tryTo = (act) => async () => {
+    if (busy.value) return;
+    busy.value = true;
     try {
       await act(one.id);
       wrong.value = null;
       await look();
     } catch (error) {
       wrong.value = /** @type {Error} */ (error).message;
+    } finally {
+      busy.value = false;
     }
   };
   return html`<li ref=${row} data-export=${one.id} data-state=${one.state}>
@@ -117,7 +123,7 @@ function Row({ one }) {
         ${one.state === "done" &&
         html`<a class="button" href=${actions.downloadAddress(one.id)} download aria-label=${`Download ${title}`}><${Icon} name="download" size=${14} />${one.bytes === null ? "Download" : size(one.bytes)}</a>`}
         ${isGoing(one)
-          ? html`<button class="button" onClick=${tryTo(actions.cancelExport)} aria-label=${`Cancel ${title}`}>Cancel</button>`
+          ? html`<button class="button" aria-disabled=${busy.value} onClick=${tryTo(actions.cancelExport)} aria-label=${`Cancel ${title}`}>${busy.value ? "Cancelling…" : "Cancel"}</button>`
           : !asking.value &&
             html`<button class="button quiet icon-only" onClick=${() => (asking.value = true)} aria-label=${`Remove ${title}`} title="Remove"><${Icon} name="trash" size=${14} /></button>`}
       </span>
@@ -127,7 +133,7 @@ function Row({ one }) {
     ${asking.value &&
     html`<div class="asking" role="group" aria-label="Remove this export">
       <span>${one.state === "done" ? "Its dataset is gone for good then." : "Nothing of it is kept then."}</span>
-      <button class="button bad" onClick=${tryTo(actions.removeExport)}>Remove</button>
+      <button class="button bad" aria-disabled=${busy.value} onClick=${tryTo(actions.removeExport)}>${busy.value ? "Removing…" : "Remove"}</button>
       <button class="button quiet" ref=${focus} onClick=${() => (asking.value = false)}>Keep</button>
     </div>`}
     ${wrong.value !== null && html`<p class="problem" role="alert">${wrong.value}</p>`}
