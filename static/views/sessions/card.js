@@ -41,21 +41,20 @@ export function Card({ session, now }) {
           }}
         ><${Icon} name="ellipsis" /></button>
       </div>
-      <div class="row">
-        <dl class="counts">
-          <${Count} of="frames" value=${session.frames} /><${Count} of="boxes" value=${session.boxes} />
-          <${Count} of="classes" value=${session.classes} />
-        </dl>
-        ${session.skipped > 0 &&
-        html`<button
-          class="note" aria-label=${`${plural(session.skipped, "frame")} skipped: which, and why`} title="Which frames, and why"
-          onClick=${() => (listing.value = true)}
-        >${session.skipped.toLocaleString("en")} skipped</button>`}
-      </div>
+      <dl class="counts">
+        <${Count} of="frames" value=${session.frames} /><${Count} of="boxes" value=${session.boxes} />
+        <${Count} of="classes" value=${session.classes} />
+      </dl>
       ${problem !== undefined && html`<p class="problem" role="alert">${problem}</p>`}
     </div>
     <div class="foot">
-      <span>Changed <time dateTime=${session.changed} title=${exactly(changed)}>${ago(changed, now)}</time></span>
+      <span><span class="visually-hidden">Changed </span>
+        <time dateTime=${session.changed} title=${`Changed ${exactly(changed)}`}>${ago(changed, now)}</time></span>
+      ${session.skipped > 0 &&
+      html`<button
+        class="note" aria-label=${`${plural(session.skipped, "frame")} skipped: which, and why`} title="Which frames, and why"
+        onClick=${() => (listing.value = true)}
+      >${session.skipped.toLocaleString("en")} skipped</button>`}
       <span class="revision" title="One more with every edit">revision ${session.revision.toLocaleString("en")}</span>
     </div>
     ${menu.value !== null &&
