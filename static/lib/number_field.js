@@ -83,6 +83,8 @@ export function NumberField(props) {
     if (!allowed(next)) return;
     draft.value = null;
     newest.current.onStep(next, hold);
+    // The next step may come before the next rendering.
+    newest.current = { ...newest.current, value: next };
   };
 
   /** @param {KeyboardEvent} event */
