@@ -109,6 +109,12 @@
     if (typeof told.dark === "boolean") document.documentElement.classList.toggle("ars-light", !told.dark);
   });
 
+  // ---------------------------------------------------------------- a server that went away
+
+  // viser tries to reach it again only while its own page has the focus, which mostly the page around it has.
+  document.hasFocus = () => !document.hidden;
+  document.addEventListener("visibilitychange", () => dispatchEvent(new Event(document.hidden ? "blur" : "focus")));
+
   // ---------------------------------------------------------------- keys
 
   /** What a browser does with these keys is not wanted: scroll, find, save, bookmark. */
