@@ -93,7 +93,9 @@ class Workspace:
 
     def enter(self, frame: int) -> None:
         """Stand at a frame's camera, and wait for its photo."""
-        self.page.evaluate("import('/static/store.js').then((store) => store.actions.enterFrame(%d))" % frame)
+        self.page.evaluate(
+            "(frame) => import('/static/store.js').then((store) => store.actions.enterFrame(frame))", frame
+        )
         self.until(
             lambda: self.page.evaluate("import('/static/store.js').then((store) => store.entered.value)") == frame
         )
@@ -129,7 +131,7 @@ class Workspace:
 
 
 @pytest.fixture
-def open_workspace(served, browser: Browser) -> Iterator[Callable[..., Any]]:
+def open_workspace(served, browser: Browser) -> Callable[..., Any]:
     """`with open_workspace(sessions) as (process, base, page_of)`; `page_of(sid)` opens another person's page."""
 
     @contextmanager
@@ -153,7 +155,7 @@ def open_workspace(served, browser: Browser) -> Iterator[Callable[..., Any]]:
                 context.close()
         assert [complaint for page in pages for complaint in page.complaints] == []
 
-    yield opened
+    return opened
 
 
 @pytest.fixture
