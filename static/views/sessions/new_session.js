@@ -40,7 +40,9 @@ function Steps() {
       ${now.at === "choose" && html`<${Choice} />`}
       ${now.at === "chosen" && html`<${ChosenRecording} chosen=${now} />`}
       ${(now.at === "sending" || now.at === "importing") &&
-      html`<div class="under-way"><${ProgressLine} step=${now} /><p class="muted">This goes on when you close the dialog, as long as this page is open.</p></div>`}
+      html`<div class="under-way"><${ProgressLine} step=${now} />
+        <p class="muted">This goes on when you close the dialog${now.at === "sending" && ", as long as the page is open"}.</p>
+      </div>`}
     </div>
     <footer>
       ${now.at === "chosen" &&
@@ -74,7 +76,7 @@ export function NewSessionStrip() {
   if (isOpen.value || !isUnderWay.value) return null;
   return html`<div class="strip card" role="group" aria-label="New session">
     ${(now.at === "sending" || now.at === "importing") &&
-    html`<${ProgressLine} step=${now} />
+    html`<${ProgressLine} step=${now} named />
       <button class="button" onClick=${begin}>Show</button><button class="button" onClick=${() => void cancel()}>Cancel</button>`}
     ${now.at === "done" &&
     html`<p role="status"><strong>${now.name}</strong> is imported.</p>

@@ -7,13 +7,18 @@ import { html } from "../../lib/view.js";
 /** What an import's phases are called here. */
 const PHASES = { reading: "Reading the recording", "checking images": "Checking images", storing: "Storing" };
 
-/** @param {{step: import("./draft.js").Sending | import("./draft.js").Importing}} props */
-export function ProgressLine({ step }) {
+/**
+ * @param {{step: import("./draft.js").Sending | import("./draft.js").Importing, named?: boolean}} props
+ *   `named`: say of what, where nothing else does
+ */
+export function ProgressLine({ step, named = false }) {
   const { words, counts, done, total, label } = step.at === "sending" ? ofSending(step) : ofImport(step);
   const left = step.pace.left(done, total, performance.now());
   const parts = [counts, left === null || done >= total ? "" : leftInWords(left)].filter((part) => part !== "");
   return html`<div class="progress-line">
-    <p><span role="status">${words}</span><span class="muted">${parts.join(", ")}</span></p>
+    <p>
+      <span role="status">${named && step.at === "importing" && html`<strong>${step.job.name}</strong> `}${words}</span><span class="muted">${parts.join(", ")}</span>
+    </p>
     <progress aria-label=${label} max=${total || 1} value=${total > 0 ? done : undefined}></progress>
   </div>`;
 }
