@@ -1,6 +1,7 @@
 """The export panel, by a real server and Chromium: options, what would be written, exports to their end."""
 
 import re
+import time
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -151,8 +152,23 @@ def test_a_running_export_is_cancelled_and_removed(long_session, open_flatly) ->
         page.get_by_role("button", name="Keep").click()
         expect(page.get_by_role("button", name="Remove YOLO")).to_be_visible()
         page.get_by_role("button", name="Remove YOLO").click()
-        page.get_by_role("group", name="Remove this export").get_by_role("button", name="Remove").click()
-        expect(page.get_by_text("None yet.")).to_be_visible(timeout=30_000)  # workers are waited for
+        remove = page.get_by_role("group", name="Remove this export").get_by_role("button", name="Remove")
+        refused = rows(page, "cancelled").get_by_role("alert")
+        gone = page.get_by_text("None yet.")
+        remove.click()
+        expect(gone.or_(refused)).to_be_visible(timeout=30_000)
+        deadline = time.monotonic() + 120
+        while refused.is_visible():
+            # On a busy machine workers take longer to stop than the server waits for them.
+            expect(refused).to_contain_text("still being stopped; try again in a moment")
+            assert time.monotonic() < deadline
+            with page.expect_response(lambda answer: answer.request.method == "DELETE"):
+                remove.click()
+            expect(gone.or_(refused.and_(page.locator("li:not(:has(.bad[aria-disabled=true])) *")))).to_be_visible(
+                timeout=30_000
+            )
+        expect(gone).to_be_visible()
+        workspace.complaints[:] = [one for one in workspace.complaints if "409" not in one]
         assert workspace.answer("/exports") == []
 
 
