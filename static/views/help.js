@@ -15,6 +15,9 @@ export function Keys({ chord }) {
     .map((key) => html`<kbd key=${key}>${NAMES[/** @type {keyof NAMES} */ (key)] ?? key}</kbd>`);
 }
 
+/** Six keys, each with and without Shift, that are said in one line. */
+const NUDGES = "nudge-";
+
 /** Not keys of commands: what mouse and wheel do. */
 const POINTER = [
   ["Scene: turn, pan, come nearer", "Drag, right drag, wheel"],
@@ -22,6 +25,11 @@ const POINTER = [
   ["Scrub the strip closer or wider", "Ctrl+wheel"],
   ["Step a number; ten times; a tenth", "Arrows; Shift; Alt"],
 ];
+
+function Nudges() {
+  return html`<div><dt>Nudge by 1 mm; turn by 0.2° with Rotate</dt><dd><kbd>Arrows</kbd><kbd>PgUp</kbd><kbd>PgDn</kbd></dd></div>
+    <div><dt>Ten times as far</dt><dd><kbd>Shift</kbd> and these</dd></div>`;
+}
 
 export function Help() {
   const close = () => (store.overlay.value = null);
@@ -33,8 +41,10 @@ export function Help() {
         (group) => html`<section key=${group}>
           <h3 class="heading">${group}</h3>
           <dl>${commands
-            .filter((one) => one.group === group && one.keys.length > 0)
-            .map((one) => html`<div key=${one.id}><dt>${one.title}</dt><dd><${Keys} chord=${one.keys[0]} /></dd></div>`)}</dl>
+            .filter((one) => one.group === group && one.keys.length > 0 && !one.id.startsWith(NUDGES))
+            .map((one) => html`<div key=${one.id}><dt>${one.title}</dt><dd><${Keys} chord=${one.keys[0]} /></dd></div>`)}
+            ${group === "Box" && html`<${Nudges} />`}
+          </dl>
         </section>`,
       )}
       <section>

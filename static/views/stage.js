@@ -68,6 +68,7 @@ function Overlays() {
         <span class="muted">of ${Math.max(0, store.frames.value - 1)}</span>
         ${inFrame && html`<${FrameName} />`}
       </div>
+      <${FrameSteps} />
       ${inFrame
         ? html`<div class="chip" title="Wheel: zoom. Drag: pan. 0: fit.">${store.zoom.value.toFixed(1)}x</div>
             <button class="chip button" onClick=${() => store.actions.leaveFrame()} title="Leave the frame (F)">Leave</button>`
@@ -96,6 +97,25 @@ function Overlays() {
       <button class="button quiet icon-only" aria-label="Dismiss" onClick=${() => store.setProblem("scene", null)}><${Icon} name="x" /></button>
     </div>`}
   `;
+}
+
+/** How far a jump can go. */
+const JUMPS = [2, 5, 10, 25, 50, 100, 250, 1000];
+
+function FrameSteps() {
+  const steps = [["jump-back", "chevrons-left"], ["previous", "chevron-left"], ["next", "chevron-right"], ["jump-on", "chevrons-right"]];
+  return html`<div class="chip frame-steps" role="group" aria-label="Step through the frames">
+    ${steps.map(([id, icon]) => {
+      const { title, keys, run } = command(id);
+      return html`<button key=${id} class="button quiet icon-only" aria-label=${title} title=${`${title} (${keys[0]})`} onClick=${run}>
+        <${Icon} name=${icon} size=${14} />
+      </button>`;
+    })}
+    <select
+      aria-label="Frames in a jump" title="How far a jump goes" value=${store.jump.value}
+      onChange=${(/** @type {any} */ event) => (store.jump.value = Number(event.currentTarget.value))}
+    >${JUMPS.map((jump) => html`<option key=${jump} value=${jump}>${jump}</option>`)}</select>
+  </div>`;
 }
 
 function snapWords() {
