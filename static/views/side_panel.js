@@ -28,9 +28,10 @@ export function SidePanel() {
         ? html`<${BoxesList} /><${BoxNumbers} /><${TellingFrames} /><${Classes} /><${Facts} />`
         : html`<${HistoryPanel} />`}
     </div>
-    <div class="panel-foot">
-      <button class="button main" disabled=${store.mode.value === "export"} onClick=${command("mode-export").run}>Export training set</button>
-    </div>`;
+    ${store.mode.value !== "export" &&
+    html`<div class="panel-foot">
+      <button class="button main" onClick=${command("mode-export").run}>Export training set</button>
+    </div>`}`;
 }
 
 function Tabs() {
