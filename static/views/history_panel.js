@@ -82,7 +82,7 @@ function Row({ edit, now }) {
   const who = edit.own ? "you" : (names.get(edit.author) ?? edit.author);
   return html`<li data-undone=${edit.undone}>
     ${edit.undone ? html`<s class="what">${edit.summary}</s><span class="visually-hidden">, undone</span>` : html`<span class="what">${edit.summary}</span>`}
-    <span class="who muted"><span class="cut">${who}</span>, <time datetime=${edit.at} title=${`${at.toLocaleString("en", { dateStyle: "medium", timeStyle: "medium" })}, revision ${edit.revision}`}>${ago(at, now)}</time></span>
+    <span class="who muted"><span class="cut" title=${edit.author}>${who}</span>, <time datetime=${edit.at} title=${`${at.toLocaleString("en", { dateStyle: "medium", timeStyle: "medium" })}, revision ${edit.revision}`}>${ago(at, now)}</time></span>
   </li>`;
 }
 

@@ -529,9 +529,13 @@ def test_a_conflict_with_a_deletion_says_so(boxed_session, open_flatly) -> None:
     with open_flatly(*boxed_session) as workspace:
         page, (box, *_) = workspace.page, workspace.answer("/boxes")
         conflicting(workspace, box, None)
-        card = page.get_by_role("region", name="Conflict").or_(page.get_by_role("alert"))
-        expect(card.first).to_contain_text(re.compile("delete|no box"))
-        refusals(workspace, 404, 412)
+        card = page.get_by_role("region", name="Conflict")
+        expect(card).to_contain_text("was deleted meanwhile")
+        expect(card.locator("tbody tr").nth(1)).to_contain_text("123.0")  # what was typed is not lost
+        card.get_by_role("button", name="Leave it deleted").click()
+        expect(card).to_have_count(0)
+        assert box["id"] not in [one["id"] for one in workspace.answer("/boxes")]
+        refusals(workspace, 412)
 
 
 def test_who_else_has_a_box_selected_is_seen_at_it(boxed_session, open_flatly) -> None:
