@@ -55,6 +55,20 @@ class Viewpoint:
     look_at: Float[np.ndarray, "3"]
 
 
+@dataclass(frozen=True)
+class Lens:
+    """The free camera's vertical field of view, radians, and the nearest and farthest that it shows, metres."""
+
+    fov: float
+    near: float
+    far: float
+
+
+def free_lens(extent: Extent) -> Lens:
+    """The free camera's lens for a recording of this size."""
+    return Lens(FIELD_OF_VIEW, near=min(0.01, 0.002 * extent.radius), far=max(1000.0, 200 * extent.radius))
+
+
 def recording_extent(Ts_world_camera: Float[np.ndarray, "n 4 4"]) -> Extent:
     """The extent of a recording of at least one frame."""
     step = max(1, len(Ts_world_camera) // SAMPLES)

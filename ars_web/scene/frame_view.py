@@ -1,6 +1,6 @@
 """Frame mode of one view: the camera stands where a frame's stood, and the frame's photo hangs behind all boxes.
 
-    view = FrameView(client, photos=…, nodes=…, poses=Ts_world_camera, send=…)     one a connected client
+    view = FrameView(client, photos=…, nodes=…, poses=Ts_world_camera, lens=…, send=…)   one a client
     view.enter(frame)      returns at once; a newer call overtakes one that waits. `send(Entered | Refused)` follows
     view.leave()           the free camera is where it was
     view.frame             the frame that is shown; None: the camera is free
@@ -21,6 +21,7 @@ from jaxtyping import Float
 from ars_web.errors import NotFound
 from ars_web.geometry.rigid_transform import Transform
 from ars_web.scene.boxes import BoxNodes
+from ars_web.scene.extent import Lens
 from ars_web.scene.hardening import is_gone
 from ars_web.scene.photo_plane import fitting_fov, photo_plane, plane_depth
 from ars_web.scene.photos import Photo, Photos, failure
@@ -36,14 +37,14 @@ NEAREST = 1e-3
 
 @dataclass(frozen=True)
 class _FreeCamera:
-    """Where the free camera was, before a frame was entered."""
+    """Where the free camera was, before a frame was entered.
+
+    Not how wide it saw: a browser that comes back after an interruption is in its frame still, zoomed perhaps.
+    """
 
     position: tuple[float, ...]
     look_at: tuple[float, ...]
     up_direction: tuple[float, ...]
-    fov: float
-    near: float
-    far: float
 
 
 @dataclass(frozen=True)
@@ -70,12 +71,14 @@ class FrameView:
         photos: Photos,
         nodes: BoxNodes,
         poses: Float[np.ndarray, "n 4 4"],
+        lens: Lens,
         send: Callable[[Entered | Refused], None],
     ) -> None:
         self._client = client
         self._photos = photos
         self._nodes = nodes
         self._poses = poses
+        self._lens = lens
         self._send = send
         self._lock = nodes.lock
         self._wanted: _Wanted | None = None
@@ -121,7 +124,7 @@ class FrameView:
                 if self._plane is not None:
                     self._plane.visible = False
                 camera = self._client.camera
-                camera.near, camera.far, camera.fov = free.near, free.far, free.fov
+                camera.near, camera.far, camera.fov = self._lens.near, self._lens.far, self._lens.fov
                 _look(camera, np.array(free.position), np.array(free.look_at), np.array(free.up_direction))
             self._client.flush()
 
@@ -167,9 +170,6 @@ class FrameView:
                 position=tuple(camera.position),
                 look_at=tuple(camera.look_at),
                 up_direction=tuple(camera.up_direction),
-                fov=camera.fov,
-                near=camera.near,
-                far=camera.far,
             )
         T_world_camera = self._poses[photo.frame]
         before, self._shown = self._shown, photo

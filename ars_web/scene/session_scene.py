@@ -19,7 +19,7 @@ from ars_web.geometry.rigid_transform import Transform
 from ars_web.scene import hardening
 from ars_web.scene.boxes import BoxNodes
 from ars_web.scene.cameras import add_cameras
-from ars_web.scene.extent import FIELD_OF_VIEW, recording_extent
+from ars_web.scene.extent import free_lens, recording_extent
 from ars_web.scene.ground import add_ground
 from ars_web.scene.photos import Photos
 from ars_web.scene.picking import Ray, pixel_angle
@@ -134,12 +134,11 @@ class SessionScene:
         server.scene.on_click()(self._clicked)  # pyright: ignore[reportArgumentType] viser takes both kinds
 
     def _set_initial_camera(self) -> None:
-        viewpoint, radius = self._around.overview(), self._around.extent.radius
+        viewpoint = self._around.overview()
         camera = self.server.initial_camera
         camera.position, camera.look_at = viewpoint.position, viewpoint.look_at
-        camera.fov = FIELD_OF_VIEW
-        camera.near = min(0.01, 0.002 * radius)
-        camera.far = max(1000.0, 200 * radius)
+        lens = free_lens(self._around.extent)
+        camera.fov, camera.near, camera.far = lens.fov, lens.near, lens.far
 
     def _tell(self, name: str, event: ViewEvent) -> None:
         """Tell a view's page of what happens there, and of drags all pages; by any thread."""

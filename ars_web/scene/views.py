@@ -14,7 +14,7 @@ from ars_web.errors import ArsError
 from ars_web.scene.box_editor import BoxEditor, Commit
 from ars_web.scene.boxes import BoxNodes, OwnBoxes
 from ars_web.scene.cameras import CAMERAS, CurrentCamera, frustum_photo
-from ars_web.scene.extent import FIELD_OF_VIEW, Extent, Viewpoint, behind_camera, close_up, overview
+from ars_web.scene.extent import FIELD_OF_VIEW, Extent, Viewpoint, behind_camera, close_up, free_lens, overview
 from ars_web.scene.frame_view import FrameView
 from ars_web.scene.ground import AXES, GROUND
 from ars_web.scene.hardening import Visitor, is_gone
@@ -102,6 +102,7 @@ class ClientView:
             photos=surroundings.photos,
             nodes=surroundings.boxes,
             poses=recording.frames.Ts_world_camera,
+            lens=free_lens(surroundings.extent),
             send=self.tell,
         )
 

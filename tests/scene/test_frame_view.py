@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from ars_web.recordings.recording import Recording
+from ars_web.scene.extent import FIELD_OF_VIEW
 from ars_web.scene.frame_view import NEAREST
 from ars_web.scene.server import SceneServers
 from ars_web.sessions.editing import SessionEditor
@@ -84,8 +85,10 @@ def test_leaving_puts_the_free_camera_back(
     visitor.listen_until(lambda v: last(v, "SetCameraUpDirectionMessage")["position"] == pytest.approx((0, 0, 1)))
     assert last(visitor, "SetCameraPositionMessage")["position"] == pytest.approx((0, 0, 2), abs=1e-12)
     assert last(visitor, "SetCameraLookAtMessage")["look_at"] == pytest.approx((0, 0, 0), abs=1e-12)
-    assert last(visitor, "SetCameraFovMessage")["fov"] == pytest.approx(0.9)
-    assert last(visitor, "SetCameraNearMessage")["near"] == 0.01
+    assert last(visitor, "SetCameraFovMessage")["fov"] == pytest.approx(FIELD_OF_VIEW)
+    assert last(visitor, "SetCameraNearMessage")["near"] == pytest.approx(
+        0.002, rel=0.5
+    )  # two thousandths of the recording
 
 
 def test_the_photo_stays_behind_a_box_that_is_moved_away(

@@ -12,10 +12,13 @@ import viser
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.camera import Camera
 from ars_web.scene.boxes import BoxNodes
+from ars_web.scene.extent import Lens
 from ars_web.scene.frame_view import FrameView
 from ars_web.scene.photos import Photos
 from ars_web.sessions.model import FrameTable
 from ars_web.workspace import Entered
+
+LENS = Lens(fov=0.9, near=0.01, far=1000.0)
 
 CAMERA = Camera(640, 480, 600.0, 600.0, 319.5, 239.5)
 
@@ -42,7 +45,7 @@ def in_frame(
     page = scene_page(1000, 700)
     page.told_by_view = []
     nodes = BoxNodes(viser_server)
-    page.view = FrameView(page.client, photos=photos, nodes=nodes, poses=Ts, send=page.told_by_view.append)
+    page.view = FrameView(page.client, photos=photos, nodes=nodes, poses=Ts, lens=LENS, send=page.told_by_view.append)
     page.tell_bridge(mode="frame", blend=1, dark=True)
     page.view.enter(0)
     until(lambda: page.scene.evaluate(OPACITY) == [1], page=page.page)

@@ -19,11 +19,14 @@ from jaxtyping import Float, UInt8
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.camera import Camera, rectified
 from ars_web.scene.boxes import BoxNodes
+from ars_web.scene.extent import Lens
 from ars_web.scene.frame_view import FrameView
 from ars_web.scene.photo_plane import fitting_fov
 from ars_web.scene.photos import Photos
 from ars_web.sessions.model import FrameTable
 from ars_web.workspace import Entered, Refused
+
+LENS = Lens(fov=0.9, near=0.01, far=1000.0)
 
 CAMERA = Camera(960, 720, 731.3, 724.9, 517.2, 331.8, "brown", (-0.21, 0.06, 0.0012, -0.0007, -0.008))
 
@@ -132,7 +135,7 @@ def test_points_and_photo_are_where_opencv_puts_them(
     page = scene_page(*SHAPES[0], ratio=ratio)
     told: list[Entered | Refused] = []
     nodes = BoxNodes(viser_server)
-    view = FrameView(page.client, photos=photos, nodes=nodes, poses=frames.Ts_world_camera, send=told.append)
+    view = FrameView(page.client, photos=photos, nodes=nodes, poses=frames.Ts_world_camera, lens=LENS, send=told.append)
     page.tell_bridge(mode="frame", blend=1, dark=True)
     view.enter(0)
     until(lambda: told, page=page.page)
