@@ -233,7 +233,7 @@ export const downloadAddress = (id) => `/api/exports/${encodeURIComponent(id)}/d
  * @param {string} view the page's own name, 32 hex digits
  * @param {number} after the newest revision that the page has
  * @param {{opened: () => void, message: (message: any) => void, closed: (code: number, reason: string) => void}} on
- * @returns {{send: (message: object) => void, close: () => void}}
+ * @returns {{send: (message: object) => void, close: () => void}} `close`: nothing more is heard of it, not even `closed`
  */
 export function openLine(sid, view, after, on) {
   const scheme = location.protocol === "https:" ? "wss" : "ws";
@@ -245,7 +245,10 @@ export function openLine(sid, view, after, on) {
     send: (message) => {
       if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
     },
-    close: () => socket.close(),
+    close: () => {
+      socket.onopen = socket.onmessage = socket.onclose = null;
+      socket.close();
+    },
   };
 }
 

@@ -104,9 +104,13 @@ async function stored(id, changes) {
   }
 }
 
-/** @param {Box} box @param {Partial<Box>} changes */
-function holds(box, changes) {
-  return JSON.stringify({ ...box, ...changes }) === JSON.stringify(box);
+/** Whether a box is what the changes make of it; its rotation may differ in the last digits. @param {Box} box @param {Partial<Box>} changes */
+function holds(box, { T_world_box: place, ...others }) {
+  if (JSON.stringify({ ...box, ...others }) !== JSON.stringify(box)) return false;
+  if (place === undefined) return true;
+  const { position, wxyz } = box.T_world_box;
+  const cosine = wxyz.reduce((sum, value, i) => sum + value * place.wxyz[i], 0);
+  return position.every((value, i) => value === place.position[i]) && Math.abs(Math.abs(cosine) - 1) < 1e-12;
 }
 
 /** @param {"open"} state @returns {Promise<void>} */

@@ -9,6 +9,8 @@ import * as store from "./store.js";
 
 /** Milliseconds until the next attempt, one after the other. */
 const PATIENCE = [200, 500, 1000, 2000, 4000];
+/** Milliseconds without a word after which a line is taken for dead: the server says something every 15 seconds. */
+const SILENCE = 40_000;
 /** Closed for good: the session is not there, or this browser is logged out. */
 const HOPELESS = new Set([4404, 1008]);
 
@@ -50,6 +52,9 @@ async function load() {
 
 /** @type {ReturnType<typeof setTimeout> | undefined} */
 let waiting;
+/** @type {ReturnType<typeof setTimeout> | undefined} */
+let silence;
+let heardAt = 0;
 
 function connect() {
   clearTimeout(waiting);
@@ -62,22 +67,43 @@ function connect() {
       sayHello();
       sendView();
     },
-    message: take,
-    closed: (code, reason) => {
-      line = null;
-      store.people.value = [];
-      store.line.value = "lost";
-      if (HOPELESS.has(code)) {
-        store.setProblem("page", reason || "The session cannot be reached any more. Load the page again.");
-        return;
-      }
-      waiting = setTimeout(connect, PATIENCE[Math.min(failures++, PATIENCE.length - 1)]);
+    message: (message) => {
+      heard();
+      take(message);
     },
+    closed: lost,
   });
+  heard();
+}
+
+/** @param {number} code @param {string} reason */
+function lost(code, reason) {
+  clearTimeout(silence);
+  line = null;
+  store.people.value = [];
+  store.line.value = "lost";
+  if (HOPELESS.has(code)) {
+    store.setProblem("page", reason || "The session cannot be reached any more. Load the page again.");
+    return;
+  }
+  waiting = setTimeout(connect, PATIENCE[Math.min(failures++, PATIENCE.length - 1)]);
+}
+
+function heard() {
+  heardAt = Date.now();
+  clearTimeout(silence);
+  silence = setTimeout(giveUp, SILENCE);
+}
+
+/** A line whose other end vanished, as it does while a laptop sleeps, is closed by nobody. */
+function giveUp() {
+  line?.close();
+  lost(1006, "");
 }
 
 /** Try again now: the laptop woke up, the network is back. */
 function hurry() {
+  if (line !== null && Date.now() - heardAt > SILENCE) giveUp();
   if (waiting === undefined) return;
   failures = 0;
   connect();
