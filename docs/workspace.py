@@ -44,7 +44,9 @@ def take(page, login: str) -> None:
     page.evaluate("import('/static/store.js').then((store) => store.actions.enterFrame(26))")
     page.wait_for_function("import('/static/store.js').then((store) => store.entered.value === 26)", timeout=60_000)
     page.keyboard.press("s")
-    page.wait_for_function("document.querySelectorAll('.telling img').length === 0 || [...document.images].every((i) => i.complete)")
+    page.wait_for_function(
+        "document.querySelectorAll('.telling img').length === 0 || [...document.images].every((i) => i.complete)"
+    )
     page.wait_for_timeout(4000)  # thumbnails and the photo, drawn in software
     page.screenshot(path=PICTURE)
 

@@ -55,9 +55,7 @@ def test_a_box_is_moved_resized_typed_taken_back_and_made_again(open_workspace, 
         assert pulled["size"][2] > moved["size"][2] + 0.005
         assert pulled["size"][:2] == pytest.approx(moved["size"][:2], abs=1e-12)
         grown = pulled["size"][2] - moved["size"][2]
-        lifted = axes_world(moved).T @ (
-            np.array(pulled["T_world_box"]["position"]) - moved["T_world_box"]["position"]
-        )
+        lifted = axes_world(moved).T @ (np.array(pulled["T_world_box"]["position"]) - moved["T_world_box"]["position"])
         assert lifted == pytest.approx([0, 0, grown / 2], abs=1e-9)
 
         # Type a size, by arithmetic.
@@ -98,9 +96,7 @@ def test_a_box_is_turned_and_nudged(open_workspace, mug):
         page.keyboard.press("Shift+PageUp")
         workspace.saved(1)  # steps close together are one edit
         nudged = workspace.box(mug_id)
-        step = axes_world(before).T @ (
-            np.array(nudged["T_world_box"]["position"]) - before["T_world_box"]["position"]
-        )
+        step = axes_world(before).T @ (np.array(nudged["T_world_box"]["position"]) - before["T_world_box"]["position"])
         assert step == pytest.approx([0.002, 0, 0.010], abs=1e-9)
 
         page.keyboard.press("r")
