@@ -17,9 +17,7 @@ class TellingFrameJson(BaseModel):
     """A frame in which errors of the box show."""
 
     frame: int
-    px_per_mm: float = Field(
-        description="pixels that a corner is drawn off for 1 mm that it is off, at most"
-    )
+    px_per_mm: float = Field(description="pixels that a corner is drawn off for 1 mm that it is off, at most")
     crop: tuple[int, int, int, int] = Field(
         description="x0 y0 x1 y1 of the part of the original image with the box in it; for the image's `crop`"
     )
