@@ -15,6 +15,8 @@ import { SnapButton } from "./snap_button.js";
 /** @typedef {"Position" | "Rotation" | "Size"} RowName */
 
 const TONES = /** @type {const} */ (["x", "y", "z"]);
+/** Metres, as the server has it. */
+const FARTHEST = 1e7;
 const LARGEST_SIZE = 1e4;
 /** Ten turns: more is a slip of the hand. */
 const MOST_DEGREES = 3600;
@@ -111,6 +113,8 @@ const LOOKS = {
     step: 0.001,
     shown: millimetres,
     edited: (/** @type {number} */ metres) => trimmed(metres * 1000, 1, 3),
+    wrong: (/** @type {number} */ metres) =>
+      Math.abs(metres) <= FARTHEST ? null : `A box is at most ${FARTHEST / 1000} km from the origin.`,
   },
   Rotation: {
     kind: "angle",
