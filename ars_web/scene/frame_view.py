@@ -90,6 +90,8 @@ class FrameView:
         self._fov = 0.0
         self._depth = 0.0
         self._plane: viser.ImageHandle | None = None
+        # The first photo of a distorted camera takes a second, for the maps that all others use as well.
+        photos.prefetch((0,))
         self._stop = nodes.watch(self._keep_behind)
         client.camera.on_update(self._fit)
 
