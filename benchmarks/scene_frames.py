@@ -21,11 +21,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 import psutil
+import scene
 from playwright.sync_api import Page, sync_playwright
 
-from ars_web.geometry import rigid_transform
-from ars_web.geometry.box import Box
-from ars_web.geometry.camera import Camera
 from ars_web.recordings.recording import Frame, RecordedBox, Recording
 from ars_web.sessions.store import SessionStore
 
@@ -58,33 +56,18 @@ ORBIT = """async seconds => {
 }"""
 
 
-def path(frames: int) -> np.ndarray:
-    """Poses (n, 4, 4) of a walk in six rounds about a table, slowly up and down, looking at its middle."""
-    turn = np.linspace(0, 12 * np.pi, frames)
-    distance = 1.5 + 0.3 * np.sin(7.3 * turn)
-    centres = np.stack([distance * np.cos(turn), distance * np.sin(turn), 0.9 + 0.5 * np.sin(1.7 * turn)], axis=1)
-    forward = -centres / np.linalg.norm(centres, axis=1, keepdims=True)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right, axis=1, keepdims=True)
-    rotation = np.stack([right, np.cross(forward, right), forward], axis=-1)
-    return rigid_transform.from_rotation(rotation, centres)
-
-
 def make_session(folder: Path, *, frames: int) -> str:
-    """A session of the path with one image for all frames, and twenty boxes; its id."""
-    image = folder / "image.jpg"
-    rng = np.random.default_rng(1)
-    assert cv2.imwrite(str(image), rng.integers(0, 255, (48, 64, 3), dtype=np.uint8).repeat(10, 0).repeat(10, 1))
+    """A session of the benchmarks' path and boxes with one image for all frames; its id."""
+    camera, image = scene.camera(), folder / "image.jpg"
+    noise = np.random.default_rng(1).integers(0, 255, (camera.height // 20, camera.width // 20, 3), dtype=np.uint8)
+    assert cv2.imwrite(str(image), noise.repeat(20, 0).repeat(20, 1))
     recording = Recording(
         format="ars",
         source=folder,
-        cameras={0: Camera(640, 480, 600.0, 600.0, 319.5, 239.5)},
-        frames=tuple(Frame(f"{i:06d}.jpg", image, 0, T) for i, T in enumerate(path(frames))),
+        cameras={0: camera},
+        frames=tuple(Frame(f"{i:06d}.jpg", image, 0, T) for i, T in enumerate(scene.poses(frames))),
         class_names=("thing",),
-        boxes=tuple(
-            RecordedBox("thing", Box(rigid_transform.from_rotation(np.eye(3), place), np.array([0.1, 0.1, 0.15])))
-            for place in np.column_stack([rng.uniform(-0.6, 0.6, (20, 2)), np.full(20, 0.075)])
-        ),
+        boxes=tuple(RecordedBox("thing", box) for box in scene.boxes()),
     )
     with SessionStore(folder / "sessions") as store:
         return store.create(recording, name="benchmark").id
