@@ -17,7 +17,6 @@ const { actions } = store;
 const hasBox = () => store.selectedBox.value !== null;
 const canEdit = () => hasBox() && !store.selectedBox.value?.locked;
 const inPlace = () => store.mode.value !== "export";
-const lastClass = () => [...store.classes.value.keys()].at(-1);
 
 /** Run an action on the selected box; what goes wrong is shown at the box. @param {(id: number) => Promise<void>} action */
 function onBox(action) {
@@ -146,8 +145,8 @@ export const commands = [
     group: "Tools",
     keys: ["B"],
     run: () => {
-      const known = store.selectedBox.value?.class_id ?? lastClass();
-      if (known === undefined) store.setProblem("boxes", "A box needs a class: add one below first.");
+      const known = store.classOfNew.value;
+      if (known === null) store.setProblem("boxes", "A box needs a class: add one below first.");
       else actions.newBox(known);
     },
     when: inPlace,
