@@ -118,8 +118,7 @@ def test_zoom_has_its_limits_and_fits_again(in_frame: Any, until: Callable[..., 
     assert scene.evaluate(ZOOM) == [fov, False]
     page.mouse.wheel(0, -400)
     until(lambda: in_frame.told("zoom")[-1]["zoom"] > 1, page=page)
-    scene.evaluate("window.focus()")
-    page.keyboard.press("0")
+    page.mouse.dblclick(250, 350)
     until(lambda: in_frame.told("zoom")[-1]["zoom"] == 1, page=page)
     page.mouse.wheel(0, -400)
     until(lambda: in_frame.told("zoom")[-1]["zoom"] > 1, page=page)
