@@ -277,7 +277,9 @@ async function request(method, address, { body, revision, key, signal, parsed = 
   if (body !== undefined) headers["Content-Type"] = "application/json";
   if (revision !== undefined) headers["If-Match"] = `"${revision}"`;
   if (key) headers["Idempotency-Key"] = randomName();
-  const send = () => fetch(address, { method, headers, body: body && JSON.stringify(body), signal });
+  // A change that is small, as these are, goes on its way also where the page is being closed.
+  const keepalive = method === "PATCH" || method === "DELETE";
+  const send = () => fetch(address, { method, headers, body: body && JSON.stringify(body), signal, keepalive });
   let response;
   try {
     response = await send().catch((error) => {

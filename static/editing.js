@@ -20,8 +20,10 @@ const QUIET = 350;
 let tell = () => {};
 /** Changes under way, by what they change. @type {Map<string, Promise<unknown>>} */
 const queues = new Map();
-/** @type {{id: number, place: Place, from: Box, timer: ReturnType<typeof setTimeout> | undefined} | null} */
+/** `from`: the box as it was seen before the first step. @type {{id: number, place: Place, from: Box, timer: ReturnType<typeof setTimeout> | undefined} | null} */
 let held = null;
+/** The revision of each box that this page made last. @type {Map<number, number>} */
+const made = new Map();
 
 /** @param {(message: object) => void} send to the scene, over the live line */
 export function connect(send) {
@@ -61,35 +63,42 @@ function existing(id) {
 /** @param {number} id @param {Partial<Pick<Box, "class_id" | "name" | "locked" | "T_world_box" | "size">>} changes */
 export async function changeBox(id, changes) {
   if (held?.id === id) await finishEdit();
+  await change(existing(id), changes);
+}
+
+/** @param {Box} seen the box that the change is made to @param {Partial<Box>} changes */
+async function change(seen, changes) {
+  const { id } = seen;
   const moves = changes.T_world_box !== undefined || changes.size !== undefined;
-  const seen = existing(id);
-  if (moves) showPreview({ box_id: id, T_world_box: changes.T_world_box ?? seen.T_world_box, size: changes.size ?? seen.size });
+  const shown = store.shownBoxes.value.get(id) ?? seen;
+  const preview = { box_id: id, T_world_box: changes.T_world_box ?? shown.T_world_box, size: changes.size ?? shown.size };
+  if (moves) showPreview(preview);
   try {
-    await inTurn(`box ${id}`, async () => takeBox(await stored(id, changes)));
+    await inTurn(`box ${id}`, async () => {
+      const box = await stored(seen, changes);
+      made.set(id, box.revision);
+      takeBox(box);
+    });
   } catch (error) {
     if (!(error instanceof api.ApiError) || error.status !== 412 || !moves) throw error;
     const current = /** @type {Box | null} */ (error.current ?? null);
     if (current !== null) takeBox(current);
-    store.conflict.value = {
-      box_id: id,
-      detail: error.message,
-      yours: { box_id: id, T_world_box: changes.T_world_box ?? seen.T_world_box, size: changes.size ?? seen.size },
-      current,
-    };
+    store.conflict.value = { box_id: id, detail: error.message, yours: preview, current };
   } finally {
-    if (moves) showPreview(null);
+    if (moves) endPreview(preview);
   }
 }
 
 /**
  * Store a change. Where the server does not answer, wait until it is back: what was typed must not be lost with it.
- * @param {number} id
+ * @param {Box} seen
  * @param {Partial<Box>} changes
  * @returns {Promise<Box>}
  */
-async function stored(id, changes) {
-  // What it was made to, also once others have been at it while the server was away: their edit is not to be lost.
-  const { revision } = existing(id);
+async function stored({ id, revision: seen }, changes) {
+  // What it was made to, also once others have been at it meanwhile: their edit is not to be lost. Only this page's own
+  // edits, which waited before it, may have come between.
+  const revision = Math.max(seen, made.get(id) ?? 0);
   for (let repeated = false; ; repeated = true) {
     try {
       return await api.changeBox(store.sid.value, id, revision, changes);
@@ -130,7 +139,8 @@ function lineIs(state) {
 /** @param {number} id @param {Place} place @param {boolean} [hold] store it only by `finishEdit`: a button is held */
 export function editBox(id, place, hold = false) {
   if (held !== null && held.id !== id) void finishEdit();
-  const from = held?.from ?? existing(id);
+  // As it is seen, since an edit that is on its way to the server is where this one goes on from.
+  const from = held?.from ?? { ...existing(id), ...store.shownBoxes.value.get(id) };
   if (from.locked) {
     store.setProblem(`box:${id}`, `${from.name} is locked: unlock it to move it.`);
     return;
@@ -146,9 +156,9 @@ export async function finishEdit() {
   clearTimeout(timer);
   held = null;
   const changes = { ...(samePose(place, from) ? {} : { T_world_box: place.T_world_box }), ...(sameSize(place, from) ? {} : { size: place.size }) };
-  if (Object.keys(changes).length === 0) return showPreview(null);
+  if (Object.keys(changes).length === 0) return endPreview(store.typed.value);
   try {
-    await changeBox(id, changes);
+    await change(from, changes);
     store.setProblem(`box:${id}`, null);
   } catch (error) {
     if (!(error instanceof api.ApiError)) throw error;
@@ -190,7 +200,9 @@ export async function duplicateBox(id) {
 /** @param {number} id */
 export async function restOnGround(id) {
   if (held?.id === id) await finishEdit();
-  takeBox(await inTurn(`box ${id}`, () => api.restOnGround(store.sid.value, id, existing(id).revision)));
+  const box = await inTurn(`box ${id}`, () => api.restOnGround(store.sid.value, id, existing(id).revision));
+  made.set(id, box.revision);
+  takeBox(box);
 }
 
 /** @param {number} classId @param {[number, number, number][]} points */
@@ -244,6 +256,8 @@ export async function overrule(yours) {
 /** @param {"undo" | "redo"} which */
 export async function stepHistory(which) {
   await finishEdit();
+  // What is under way is part of the history that is stepped through.
+  await Promise.all(queues.values());
   try {
     await inTurn("history", () => api[which](store.sid.value));
     store.setProblem("history", null);
@@ -264,10 +278,17 @@ export async function renameSession(name) {
   });
 }
 
-/** @param {BoxPreview | null} preview */
+/** @param {BoxPreview} preview */
 function showPreview(preview) {
-  store.preview.value = preview;
-  tell(preview === null ? { type: "preview", box_id: null } : { type: "preview", ...preview });
+  store.typed.value = preview;
+  tell({ type: "preview", ...preview });
+}
+
+/** Take a preview back, unless a newer one has taken its place. @param {BoxPreview | null} preview */
+function endPreview(preview) {
+  if (preview === null || store.typed.value !== preview) return;
+  store.typed.value = null;
+  tell({ type: "preview", box_id: null });
 }
 
 /** @param {Place} a @param {Place} b */

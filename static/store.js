@@ -59,8 +59,10 @@ export const unsaved = signal(0);
 /** The line to the server: events come, and edits of others are seen, only while it is open. */
 export const line = signal(/** @type {"connecting" | "open" | "lost"} */ ("connecting"));
 export const people = signal(/** @type {Person[]} */ ([]));
-/** The box being dragged or typed, here or in another browser. */
+/** The box being dragged, here or in another browser. */
 export const preview = signal(/** @type {BoxPreview | null} */ (null));
+/** The box being typed or stepped here, until it is stored; no drag elsewhere takes it away. */
+export const typed = signal(/** @type {BoxPreview | null} */ (null));
 /** What a drag changes, for beside the pointer; x and y in CSS pixels of the scene. */
 export const dragged = signal(/** @type {{text: string, x: number, y: number} | null} */ (null));
 export const conflict = signal(/** @type {Conflict | null} */ (null));
@@ -95,12 +97,15 @@ export const jump = signal(10);
 export const theme = signal(/** @type {"dark" | "light"} */ ("dark"));
 
 export const frames = computed(() => session.value?.frames ?? 0);
-/** The boxes as they are seen: with the preview in the place of what is stored. */
+/** The boxes as they are seen: with what is dragged and typed in the place of what is stored. */
 export const shownBoxes = computed(() => {
-  const now = preview.value;
-  const stored = now === null ? undefined : boxes.value.get(now.box_id);
-  if (now === null || stored === undefined) return boxes.value;
-  return new Map(boxes.value).set(now.box_id, { ...stored, T_world_box: now.T_world_box, size: now.size });
+  let shown = boxes.value;
+  for (const now of [preview.value, typed.value]) {
+    const stored = now === null ? undefined : shown.get(now.box_id);
+    if (now === null || stored === undefined) continue;
+    shown = new Map(shown).set(now.box_id, { ...stored, T_world_box: now.T_world_box, size: now.size });
+  }
+  return shown;
 });
 export const selectedBox = computed(() =>
   selected.value === null ? null : (shownBoxes.value.get(selected.value) ?? null),

@@ -150,6 +150,7 @@ export function NumberField(props) {
  */
 function useScrub(on) {
   const stop = useRef(() => {});
+  // A field may go while it is drawn, with its box: what was drawn ends there.
   useEffect(() => () => stop.current(), []);
   /** @param {PointerEvent} event */
   return (event) => {
@@ -170,9 +171,9 @@ function useScrub(on) {
     };
     /** @param {Event} event */
     const finish = (event) => {
+      const clicked = !moving && event.type === "pointerup";
       stop.current();
-      if (moving) on.end();
-      else if (event.type === "pointerup") on.click();
+      if (clicked) on.click();
     };
     /** @param {KeyboardEvent} event */
     const keys = (event) => {
@@ -187,6 +188,7 @@ function useScrub(on) {
       letter.removeEventListener("pointerup", finish);
       removeEventListener("keydown", keys, true);
       stop.current = () => {};
+      if (moving) on.end();
     };
     letter.addEventListener("pointermove", move);
     letter.addEventListener("pointerup", finish);
