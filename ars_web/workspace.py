@@ -195,6 +195,7 @@ class ScenePages(Protocol):
 
         Raises:
             NotFound: there is no such session.
+            BadInput: the view is somebody else's page.
         """
         ...
 

@@ -187,7 +187,8 @@ class LiveLine:
         """Called by any thread."""
         match event:
             case Dragged():
-                key = ("dragged", event.preview.box_id)
+                # Not one in the place of the other: the end of one's own is not to be lost where another begins.
+                key = ("dragged", event.preview.box_id, event.own)
             case Conflicted() | Refused():
                 key = None
             case _:

@@ -149,9 +149,10 @@ class FrameView:
 
     def _made(self, made: "Future[Photo]", wanted: "_Wanted") -> None:
         """Show a photo that is made, unless the frame has been left meanwhile, and go on with what is wanted since."""
+        with self._lock:
+            self._busy = False  # before all else: whatever went wrong with this photo, the next one can be had
         error = None if made.cancelled() else failure(made)
         with self._lock:
-            self._busy = False
             current = wanted.turn == self._turn and not self._closed and not made.cancelled()
             current = current and not is_gone(self._client)
             if current and error is None:

@@ -12,9 +12,13 @@ from ars_web.geometry.camera import Camera, rectified
 from ars_web.geometry.rigid_transform import Transform
 from ars_web.scene.extent import Extent
 from ars_web.sessions.model import ObjectClass, VirtualBox
+from ars_web.workspace import Refused
 
 USUAL_SIZE = 0.1
 """Metres, of a side where nothing is known of the class, in a recording of about a table's size."""
+
+NOT_CONNECTED = Refused("the 3D scene is not connected yet; add the box once it shows")
+"""There is no view that looks anywhere."""
 
 FARTHEST_GROUND = 3.0
 """The ground is looked at only where it is nearer than this many times what else would be: not at the horizon."""

@@ -9,11 +9,11 @@ from dataclasses import dataclass, field
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from ars_web.errors import ArsError, NotFound, StoreError
+from ars_web.errors import ArsError, BadInput, NotFound, StoreError
 from ars_web.sessions.editing import SessionEditor
 from ars_web.sessions.edits import Edit
 from ars_web.sessions.store import SessionStore
-from ars_web.workspace import BoxPreview, SceneAddress, ScenePage, ViewAction, ViewEvent, ViewState
+from ars_web.workspace import BoxPreview, NewBox, SceneAddress, ScenePage, ViewAction, ViewEvent, ViewState
 
 if TYPE_CHECKING:  # viser takes a third of a second to import, which programs that show no scene need not wait for
     from ars_web.scene.session_scene import SessionScene
@@ -100,9 +100,14 @@ class SceneServers:
 
         Raises:
             NotFound: there is no such session.
+            BadInput: the view is somebody else's page.
         """
         from ars_web.scene.hardening import AUTHOR_HEADER, SECRET, SECRET_HEADER, VIEW_HEADER
 
+        with self._lock:
+            known = self._attached.get(sid, {}).get(view)
+        if known is not None and known.page.author != author:
+            raise BadInput("this view is somebody else's page; choose another random name")
         scene = self._opened(sid)
         return SceneAddress(
             url=f"ws://127.0.0.1:{scene.port}/",
@@ -158,9 +163,14 @@ class SceneServers:
     def act(self, sid: str, view: str, action: ViewAction) -> None:
         """Do this once."""
         with self._lock:
+            known = self._attached.get(sid, {}).get(view)
             scene = self._scene(sid)
         if scene is not None:
             scene.act(view, action)
+        elif known is not None and isinstance(action, NewBox):
+            from ars_web.scene.placing import NOT_CONNECTED
+
+            known.page.send(NOT_CONNECTED)
 
     def preview(self, sid: str, view: str, preview: BoxPreview | None) -> None:
         """Show a box as it is being typed, to all views of the session; None: no more."""

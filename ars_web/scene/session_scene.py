@@ -22,9 +22,10 @@ from ars_web.scene.boxes import BoxNodes
 from ars_web.scene.cameras import add_cameras
 from ars_web.scene.extent import free_lens, recording_extent
 from ars_web.scene.ground import add_ground
+from ars_web.scene.hardening import Visitor
 from ars_web.scene.photos import Photos
 from ars_web.scene.picking import Ray, pixel_angle
-from ars_web.scene.placing import Sight, placed, usual_size
+from ars_web.scene.placing import NOT_CONNECTED, Sight, placed, usual_size
 from ars_web.scene.views import ClientView, Page, Surroundings
 from ars_web.sessions.editing import SessionEditor
 from ars_web.sessions.model import VirtualBox
@@ -117,8 +118,12 @@ class SessionScene:
 
     def close(self) -> None:
         """Let go of all browsers and stop the server; its thread has ended then."""
-        with suppress(RuntimeError):  # the loop has ended by itself
+        try:
             asyncio.run_coroutine_threadsafe(self._end(), self._loop).result(CLOSING_SECONDS)
+        except RuntimeError:
+            pass  # the loop has ended by itself
+        except TimeoutError:
+            log.warning("session %s: its scene is busy, and is stopped all the same", self._around.recording.id)
         self.server.stop()
         self._around.photos.close()
 
@@ -146,9 +151,14 @@ class SessionScene:
         lens = free_lens(self._around.extent)
         camera.fov, camera.near, camera.far = lens.fov, lens.near, lens.far
 
-    def _tell(self, name: str, event: ViewEvent) -> None:
+    def _page(self, visitor: Visitor) -> Page | None:
+        """The page that a visitor's view belongs to: its author may have named somebody else's."""
+        page = self._pages.get(visitor.view)
+        return None if page is None or page.author != visitor.author else page
+
+    def _tell(self, visitor: Visitor, event: ViewEvent) -> None:
         """Tell a view's page of what happens there, and of drags all pages; by any thread."""
-        page = self._pages.get(name)
+        page = self._page(visitor)
         if page is not None:
             page.send(event)
         if isinstance(event, Dragged):
@@ -196,7 +206,7 @@ class SessionScene:
         visitor = hardening.visitor()
         view = ClientView(client, visitor, self._around, commit=partial(self._commit, visitor.author))
         self._clients[client.client_id] = view
-        state = self._states.get(visitor.view)
+        state = None if self._page(visitor) is None else self._states.get(visitor.view)
         if state is not None or not visitor.view:
             view.show(state or ViewState())
 
@@ -206,7 +216,11 @@ class SessionScene:
             view.close()
 
     def _views(self, name: str) -> list[ClientView]:
-        return [view for view in self._clients.values() if view.visitor.view == name]
+        return [
+            view
+            for view in self._clients.values()
+            if view.visitor.view == name and self._page(view.visitor) is not None
+        ]
 
     def _attach(self, page: Page) -> None:
         self._pages[page.view] = page
@@ -229,7 +243,9 @@ class SessionScene:
             # Once, by the newest: a page that is loaded again may still be there twice.
             view = next((view for view in reversed(views) if not hardening.is_gone(view.client)), None)
             if view is None:
-                self._tell(name, Refused("the 3D scene is not connected yet; add the box once it shows"))
+                page = self._pages.get(name)
+                if page is not None:
+                    page.send(NOT_CONNECTED)
             else:
                 self._workers.submit(self._add_box, view, view.sight(), action.class_id)
             return

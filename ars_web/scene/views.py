@@ -50,7 +50,8 @@ class Surroundings:
     Attributes:
         recording: the session as it was when the scene was opened; its frames and cameras never change.
         workers: for what would hold up the event loop.
-        tell: says what happens in a view to its page, and of drags to the others' as well; for any thread.
+        tell: says what happens in a visitor's view to the page of it, and of drags to the others' as well; for any
+            thread.
     """
 
     recording: SessionSnapshot
@@ -58,7 +59,7 @@ class Surroundings:
     boxes: BoxNodes
     photos: Photos
     workers: Executor
-    tell: Callable[[str, ViewEvent], None]
+    tell: Callable[[Visitor, ViewEvent], None]
 
     @property
     def centres(self) -> Float[np.ndarray, "n 3"]:
@@ -167,7 +168,7 @@ class ClientView:
 
     def tell(self, event: ViewEvent) -> None:
         """Tell the page, and of drags the other pages; for any thread."""
-        self._around.tell(self.visitor.view, event)
+        self._around.tell(self.visitor, event)
 
     def close(self) -> list[asyncio.Task[None]]:
         """The browser is gone; what was being done for it is cancelled, and ends soon."""

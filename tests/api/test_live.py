@@ -263,6 +263,19 @@ def test_a_slow_page_gets_the_newest_drag_and_every_edit(
     assert len(order) < drags
 
 
+def test_the_end_of_ones_own_drag_is_told_though_another_drags_the_same_box_then(line, sid: str, scene) -> None:
+    with line() as page:
+        page.next()
+        for i in range(2000):  # of 10 KB each: more than the connection holds
+            scene.send[sid, A](Dragged("move", preview(8), f"{i}".ljust(10_000), own=False))
+        scene.send[sid, A](Dragged("end", preview(), "own", own=True))
+        scene.send[sid, A](Dragged("start", preview(), "another's", own=False))
+        texts: list[str] = []
+        while "another's" not in texts:
+            texts.append(page.next("dragged")["text"])
+    assert texts[-2:] == ["own", "another's"]
+
+
 def test_a_page_that_never_reads_is_given_up(server, line, sid: str, scene, until) -> None:
     server.app.state.services = replace(server.services, lines=LiveLines(patience_seconds=0.2))
     with line() as page:

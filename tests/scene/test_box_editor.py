@@ -126,7 +126,7 @@ def test_others_see_the_drag_and_are_told(
     page: Page, scenes: SceneServers, sid: str, visit: Callable[..., Any], until: Callable[..., None]
 ) -> None:
     page.show(selected=1, tool="move", axes="world")
-    with visit(scenes.address(sid, view=OTHER, author="page-b")) as visitor:
+    with visit(scenes.address(sid, view=OTHER, author=f"page-{OTHER[:8]}")) as visitor:
         other = Page(scenes, sid, OTHER, visitor)
         page.grab()
         to = moved(page.pose(), 0.2, 0.0, 0.0)
@@ -161,7 +161,7 @@ def test_a_browser_that_vanishes_stores_nothing(
     scenes: SceneServers, store: SessionStore, sid: str, visit: Callable[..., Any], until: Callable[..., None]
 ) -> None:
     before = store.state(sid)
-    with visit(scenes.address(sid, view=VIEW, author="page-a")) as visitor:
+    with visit(scenes.address(sid, view=VIEW, author=f"page-{VIEW[:8]}")) as visitor:
         page = Page(scenes, sid, VIEW, visitor)
         page.show(selected=1, tool="move")
         page.grab()
@@ -289,3 +289,10 @@ def test_a_new_box_before_the_scene_is_there_is_refused_in_words(
     scenes.attach(sid, OTHER, author="page-b", send=told.append)
     scenes.act(sid, OTHER, NewBox(0))
     until(lambda: told == [Refused("the 3D scene is not connected yet; add the box once it shows")])
+
+
+def test_a_new_box_before_any_scene_is_open_is_refused_in_words(scenes: SceneServers, sid: str) -> None:
+    told: list[ViewEvent] = []
+    scenes.attach(sid, VIEW, author="page-a", send=told.append)
+    scenes.act(sid, VIEW, NewBox(0))
+    assert told == [Refused("the 3D scene is not connected yet; add the box once it shows")]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from ars_web.recordings.recording import Recording
+from ars_web.scene import photos
 from ars_web.scene.extent import FIELD_OF_VIEW
 from ars_web.scene.frame_view import NEAREST
 from ars_web.scene.server import SceneServers
@@ -43,7 +44,12 @@ def last(visitor: Any, kind: str) -> dict[str, Any]:
 
 
 def test_the_camera_stands_where_the_frames_stood_and_its_photo_is_sent_as_it_is(
-    scenes: SceneServers, sid: str, visitor: Any, told: list[ViewEvent], recording: Recording
+    scenes: SceneServers,
+    sid: str,
+    visitor: Any,
+    told: list[ViewEvent],
+    recording: Recording,
+    until: Callable[..., None],
 ) -> None:
     scenes.show(sid, VIEW, ViewState(mode="frame", frame=2))
     photo = recording.frames[2].image.read_bytes()
@@ -59,6 +65,7 @@ def test_the_camera_stands_where_the_frames_stood_and_its_photo_is_sent_as_it_is
     # 16:9, so the photo's height decides: 60 pixels each way at 150.
     assert last(visitor, "SetCameraFovMessage")["fov"] == pytest.approx(2 * math.atan(60 / 150))
     assert visitor.nodes["/photo"]["_format"] == "jpeg"
+    until(lambda: any(isinstance(event, Entered) for event in told))
     [entered] = [event for event in told if isinstance(event, Entered)]
     assert entered.frame == 2
     assert entered.milliseconds > 0
@@ -126,6 +133,30 @@ def test_a_photo_that_cannot_be_shown_is_refused_in_words(
     until(lambda: any("no frame 99" in event.detail for event in told if isinstance(event, Refused)))
     scenes.show(sid, VIEW, ViewState(mode="frame", frame=1))
     until(lambda: Entered in map(type, told))
+
+
+def test_a_fault_at_one_photo_does_not_keep_the_next_one_away(
+    scenes: SceneServers,
+    sid: str,
+    visitor: Any,
+    told: list[ViewEvent],
+    monkeypatch: pytest.MonkeyPatch,
+    until: Callable[..., None],
+) -> None:
+    tried: list[int] = []
+    make = photos.make_photo
+
+    def faulty(frame: int, *rest: Any) -> photos.Photo:
+        tried.append(frame)
+        if frame == 3:
+            raise RuntimeError("a fault of this program")
+        return make(frame, *rest)
+
+    monkeypatch.setattr(photos, "make_photo", faulty)
+    scenes.show(sid, VIEW, ViewState(mode="frame", frame=3))
+    until(lambda: 3 in tried)
+    scenes.show(sid, VIEW, ViewState(mode="frame", frame=1))
+    until(lambda: [event.frame for event in told if isinstance(event, Entered)] == [1])
 
 
 def test_a_row_of_wishes_ends_at_the_last(

@@ -11,14 +11,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ars_web.errors import NotFound, StoreError
+from ars_web.errors import BadInput, NotFound, StoreError
 from ars_web.geometry.box import Box
 from ars_web.recordings.recording import Recording
-from ars_web.scene.hardening import SECRET
+from ars_web.scene import session_scene
+from ars_web.scene.hardening import SECRET, Visitor, is_stopped
 from ars_web.scene.server import SceneServers
 from ars_web.sessions.editing import SessionEditor
 from ars_web.sessions.store import SessionStore
-from ars_web.workspace import BoxPreview, Dragged, Look, Picked, Refused, SceneViews, ViewEvent, ViewState
+from ars_web.workspace import BoxPreview, Dragged, Look, NewBox, Picked, Refused, SceneViews, ViewEvent, ViewState
 
 VIEW, OTHER = "a" * 32, "b" * 32
 
@@ -129,7 +130,7 @@ def test_each_view_has_its_own_frame(servers: SceneServers, store: SessionStore,
         servers.show(sid, view, ViewState(frame=frame))
     with (
         visit(servers.address(sid, view=VIEW, author="page-1")) as one,
-        visit(servers.address(sid, view=OTHER, author="page-2")) as other,
+        visit(servers.address(sid, view=OTHER, author="page-1")) as other,
     ):
         one.listen_until(at(poses[1, :3, 3], "/current"))
         other.listen_until(at(poses[5, :3, 3], "/current"))
@@ -253,9 +254,10 @@ def test_of_drags_all_pages_are_told(servers: SceneServers, store: SessionStore,
     scene = servers._open[sid].scene  # pyright: ignore[reportPrivateUsage]
     assert scene is not None
     preview = BoxPreview(1, store.state(sid).boxes[1].box)
+    visitor = Visitor(view=VIEW, author="page-1")
     deadline = threading.Event()
     for _ in range(2000):
-        scene._tell(VIEW, Dragged("move", preview, "X +1.0 mm", own=True))  # pyright: ignore[reportPrivateUsage]
+        scene._tell(visitor, Dragged("move", preview, "X +1.0 mm", own=True))  # pyright: ignore[reportPrivateUsage]
         if own and others:
             break
         deadline.wait(0.01)
@@ -263,6 +265,27 @@ def test_of_drags_all_pages_are_told(servers: SceneServers, store: SessionStore,
     assert own[0].own
     assert isinstance(others[0], Dragged)
     assert not others[0].own
+
+
+def test_nobody_looks_through_another_authors_view(
+    servers: SceneServers, store: SessionStore, sid: str, visit: Callable
+) -> None:
+    events: queue.Queue[ViewEvent] = queue.Queue()
+    # Before the page was there, or while its line was interrupted, nobody could know whose the name is.
+    with visit(servers.address(sid, view=VIEW, author="page-2")) as thief:
+        thief.listen_until(lambda v: "/boxes/1/at" in v.nodes)
+        servers.attach(sid, VIEW, author="page-1", send=events.put)
+        servers.show(sid, VIEW, ViewState(frame=5))
+        with pytest.raises(BadInput, match="somebody else's page"):
+            servers.address(sid, view=VIEW, author="page-2")
+        servers.act(sid, VIEW, NewBox(0))
+        assert events.get(timeout=20) == Refused("the 3D scene is not connected yet; add the box once it shows")
+        assert store.revision(sid) == 0
+        with visit(servers.address(sid, view=VIEW, author="page-1")) as owner:
+            owner.listen_until(lambda v: "/current" in v.nodes)
+            servers.act(sid, VIEW, NewBox(1))
+            assert isinstance(events.get(timeout=20), (Picked, Refused))
+        assert "/current" not in thief.nodes
 
 
 def test_nonsense_from_a_client_does_not_end_the_scene(servers: SceneServers, sid: str, visit: Callable) -> None:
@@ -301,6 +324,24 @@ def test_a_scene_that_nobody_looks_at_is_closed_and_opens_again(
         until(lambda: servers.open_sessions == frozenset())
         with visit(servers.address(sid, view=VIEW, author="page-1")) as visitor:
             visitor.listen_until(at(store.frames(sid).Ts_world_camera[4, :3, 3], "/current"))
+
+
+def test_a_scene_that_is_busy_is_stopped_all_the_same(
+    servers: SceneServers, sid: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, until: Callable
+) -> None:
+    monkeypatch.setattr(session_scene, "CLOSING_SECONDS", 0.05)
+    servers.address(sid, view="", author="api")
+    scene = servers._open[sid].scene  # pyright: ignore[reportPrivateUsage]
+    assert scene is not None
+    free = threading.Event()
+    scene.server.get_event_loop().call_soon_threadsafe(free.wait)
+    servers.idle_seconds = 0.0
+    until(lambda: "busy" in caplog.text)
+    free.set()
+    until(lambda: is_stopped(scene.server))
+    # What closes idle scenes goes on.
+    assert servers.address(sid, view="", author="api").url
+    until(lambda: servers.open_sessions == frozenset())
 
 
 def test_fifty_scenes_are_opened_and_leave_no_thread(
