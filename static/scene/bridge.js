@@ -9,7 +9,10 @@
  *   {ars: "pointer", x, y, buttons}          CSS pixels in the iframe, while a button is down and once when it is not
  * What it hears, from the page around it alone:
  *   {ars: "view", mode: "scene" | "frame", blend, dark}         blend: 0 no photo, 1 the photo as it is
- *   {ars: "fit"}                                                zoom 1, as double-click and the key 0 do here
+ *   {ars: "fit"}                                                zoom 1, as a double-click does here
+ *   {ars: "zoom", by}                                           times that about the middle
+ *   {ars: "show", box}                                          zoom to the box of this id, and stay with it from frame
+ *                                                               to frame until it is zoomed or moved otherwise
  *
  * A classic script, since it has to hear keys before viser's own, deferred one.
  */
@@ -24,13 +27,16 @@
    * @property {number} y
    * @property {number} z
    * @property {() => Vector} clone
+   * @property {(x: number, y: number, z: number) => Vector} set
    * @property {(matrix: unknown) => Vector} setFromMatrixPosition
    * @property {(matrix: unknown) => Vector} applyMatrix4
    *
    * @typedef {object} Camera three.js's PerspectiveCamera; `fov` is vertical, in degrees
    * @property {number} fov
    * @property {Vector} position
+   * @property {{toArray: () => number[]}} matrixWorld
    * @property {unknown} matrixWorldInverse
+   * @property {(parents: boolean, children: boolean) => void} updateWorldMatrix
    * @property {unknown} projectionMatrix
    * @property {() => void} updateProjectionMatrix
    * @property {(fullWidth: number, fullHeight: number, x: number, y: number, width: number, height: number) => void} setViewOffset
@@ -46,6 +52,7 @@
    * @property {Node | null} parent
    * @property {Material} [material]
    * @property {unknown} matrixWorld
+   * @property {(parents: boolean, children: boolean) => void} updateWorldMatrix
    * @property {{x: number, setScalar: (scale: number) => void}} scale
    * @property {(callback: (node: Node) => void) => void} traverse
    *
@@ -67,6 +74,9 @@
   const LARGEST_ZOOM = 20;
   const STILL = 4; // CSS pixels that a press may move and be a click
   const PHOTO = "/photo"; // as in scene/frame_view.py
+  /** Of a box: a cube of side 1 in its own coordinates. @param {number} id */
+  const edgesOf = (id) => `/boxes/${id}/at/edges`; // as in scene/boxes.py
+  const SHARE = 0.6; // of the window, that a box fills which is zoomed to
   const HANDLES = "/edit/handle/"; // as in scene/face_handles.py
   const BALL = 0.01; // their radius there, metres
   const HANDLE_PIXELS = 11; // radius of what takes the press; the dot is smaller, see bridge.css
@@ -77,6 +87,8 @@
   /** The camera's own field of view, and what it was set to last here. */
   const fov = { base: 0, set: 0 };
   let offset = "";
+  /** The box that is stayed with, and from where it was last seen. @type {{box: number, from: string} | null} */
+  let follows = null;
   /** @type {{controls: Controls, mouseButtons: Record<string, number>, touches: Record<string, number>} | null} */
   let locked = null;
   /** @type {{id: number, x: number, y: number, moving: boolean} | null} */
@@ -103,6 +115,8 @@
     const told = event.data;
     if (told === null || typeof told !== "object") return;
     if (told.ars === "fit") fit();
+    if (told.ars === "zoom" && Number.isFinite(told.by) && told.by > 0) zoomAboutMiddle(told.by);
+    if (told.ars === "show" && Number.isInteger(told.box) && view.mode === "frame") follows = { box: told.box, from: "" };
     if (told.ars !== "view") return;
     if (told.mode === "scene" || told.mode === "frame") view.mode = told.mode;
     if (Number.isFinite(told.blend)) view.blend = Math.min(1, Math.max(0, told.blend));
@@ -132,17 +146,6 @@
     const plain = !ctrl && !alt && !meta;
     if (plain ? !/^(Tab|F\d+)$/.test(key) : (ctrl || meta) && OURS_WITH_CONTROL.has(key.toLowerCase())) event.preventDefault();
     if (code === "Space") space = type === "keydown";
-    if (type === "keydown" && plain && view.mode === "frame") zoomByKey(key);
-  }
-
-  /** @param {string} key */
-  function zoomByKey(key) {
-    const viser = found();
-    if (viser === null) return;
-    const { clientWidth, clientHeight } = viser.canvas;
-    if (key === "0") fit();
-    else if (key === "+" || key === "=") zoomAbout(viser, clientWidth / 2, clientHeight / 2, 1.25);
-    else if (key === "-") zoomAbout(viser, clientWidth / 2, clientHeight / 2, 0.8);
   }
 
   addEventListener("keydown", hearKey, true);
@@ -154,8 +157,50 @@
   const half = () => Math.tan((fov.base * Math.PI) / 360);
 
   function fit() {
+    follows = null;
     Object.assign(window2d, { zoom: 1, x: 0, y: 0 });
     tell({ ars: "zoom", zoom: 1 });
+  }
+
+  /** @param {number} factor */
+  function zoomAboutMiddle(factor) {
+    const viser = found();
+    if (viser === null || view.mode !== "frame") return;
+    zoomAbout(viser, viser.canvas.clientWidth / 2, viser.canvas.clientHeight / 2, factor);
+  }
+
+  /**
+   * Put the box that is stayed with in the middle, whenever the camera or the window is another than before: not while
+   * the box itself is moved.
+   * @param {Viser} viser
+   */
+  function follow(viser) {
+    const { camera, canvas, nodeRefFromName } = viser;
+    const { clientWidth: width, clientHeight: height } = canvas;
+    if (follows === null || width === 0 || height === 0) return;
+    camera.updateWorldMatrix(true, false);
+    const from = [...camera.matrixWorld.toArray(), fov.base, width, height].join();
+    const node = nodeRefFromName[edgesOf(follows.box)];
+    if (from === follows.from || node === undefined || !isVisible(node)) return;
+    follows.from = from;
+    let unit = node; // what is scaled to the box's size is in it
+    node.traverse((each) => void (each.material !== undefined && (unit = each)));
+    unit.updateWorldMatrix(true, false);
+    const [across, down] = [[], []].map(() => ({ least: Infinity, most: -Infinity }));
+    for (const x of [-0.5, 0.5]) for (const y of [-0.5, 0.5]) for (const z of [-0.5, 0.5]) {
+      const eye = camera.position.clone().set(x, y, z).applyMatrix4(unit.matrixWorld).applyMatrix4(camera.matrixWorldInverse);
+      if (eye.z >= 0) return; // partly behind the camera
+      for (const [side, tangent] of /** @type {const} */ ([[across, -eye.x / eye.z], [down, eye.y / eye.z]])) {
+        side.least = Math.min(side.least, tangent);
+        side.most = Math.max(side.most, tangent);
+      }
+    }
+    const fitting = Math.min((half() * width) / height / (across.most - across.least), half() / (down.most - down.least));
+    window2d.zoom = Math.min(LARGEST_ZOOM, Math.max(1, 2 * SHARE * fitting));
+    window2d.x = (across.least + across.most) / 2;
+    window2d.y = (down.least + down.most) / 2;
+    keepInside(width / height);
+    tell({ ars: "zoom", zoom: window2d.zoom });
   }
 
   /**
@@ -164,6 +209,7 @@
    */
   function zoomAbout(viser, x, y, factor) {
     const { clientWidth: width, clientHeight: height } = viser.canvas;
+    follows = null;
     const before = (2 * half()) / window2d.zoom / height;
     window2d.zoom = Math.min(LARGEST_ZOOM, Math.max(1, window2d.zoom * factor));
     const after = (2 * half()) / window2d.zoom / height;
@@ -176,6 +222,7 @@
   /** @param {Viser} viser @param {number} dx @param {number} dy CSS pixels */
   function panBy(viser, dx, dy) {
     const { clientWidth: width, clientHeight: height } = viser.canvas;
+    follows = null;
     const tangent = (2 * half()) / window2d.zoom / height;
     window2d.x -= dx * tangent;
     window2d.y -= dy * tangent;
@@ -288,6 +335,7 @@
     if (camera.fov !== fov.set) fov.base = camera.fov; // the server has set another one
     const { clientWidth: width, clientHeight: height } = canvas;
     if (width === 0 || height === 0) return;
+    follow(viser);
     keepInside(width / height);
     const tangent = half() / window2d.zoom;
     const wanted = window2d.zoom === 1 ? fov.base : (Math.atan(tangent) * 360) / Math.PI;

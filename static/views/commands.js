@@ -1,6 +1,7 @@
 /** Everything frequent, once: what the keys, the palette, the key list and the tool rail all take from. */
 
 import * as store from "../store.js";
+import * as sight from "./photo_sight.js";
 
 /**
  * @typedef {object} Command
@@ -17,6 +18,7 @@ const { actions } = store;
 const hasBox = () => store.selectedBox.value !== null;
 const canEdit = () => hasBox() && !store.selectedBox.value?.locked;
 const inPlace = () => store.mode.value !== "export";
+const inFrame = () => store.mode.value === "frame";
 
 /** Run an action on the selected box; what goes wrong is shown at the box. @param {(id: number) => Promise<void>} action */
 function onBox(action) {
@@ -38,6 +40,9 @@ function take(tool) {
   store.tool.value = tool;
   if (store.mode.value === "export") goMode("scene");
 }
+
+/** In a frame, where the camera stays, the photo is zoomed to the box instead. */
+const lookAtBox = () => (inFrame() ? sight.zoomToBox() : actions.look("selected"));
 
 /** @param {number} step */
 const stepFrame = (step) => actions.goTo(store.frame.value + step);
@@ -103,7 +108,7 @@ export const commands = [
     run: () => (store.mode.value === "frame" ? actions.leaveFrame() : actions.enterFrame()),
   },
   { id: "look-all", title: "Look at everything", group: "View", keys: ["Home"], run: () => actions.look("all"), when: inPlace },
-  { id: "look-selected", title: "Look at the selected box", group: "View", keys: ["L"], run: () => actions.look("selected"), when: hasBox },
+  { id: "look-selected", title: "Look at the selected box", group: "View", keys: ["L"], run: lookAtBox, when: () => inPlace() && hasBox() },
   { id: "look-frame", title: "Look at the current frame's camera", group: "View", keys: ["Shift+L"], run: () => actions.look("frame"), when: inPlace },
   {
     id: "contact-sheet",
@@ -118,8 +123,11 @@ export const commands = [
     group: "View",
     keys: ["X"],
     run: () => (store.blend.value = store.blend.value > 0 ? 0 : 1),
-    when: () => store.mode.value === "frame",
+    when: inFrame,
   },
+  { id: "zoom-in", title: "Zoom in", group: "View", keys: ["+", "="], run: sight.zoomIn, when: inFrame },
+  { id: "zoom-out", title: "Zoom out", group: "View", keys: ["-"], run: sight.zoomOut, when: inFrame },
+  { id: "whole-photo", title: "Whole photo", group: "View", keys: ["0"], run: sight.wholePhoto, when: inFrame },
   {
     id: "theme",
     title: "Dark or light",

@@ -5,6 +5,7 @@ import { Icon } from "../lib/icon.js";
 import { html, useEffect, useRef, useSignal, useSignalEffect } from "../lib/view.js";
 import * as store from "../store.js";
 import { Hints } from "./hints.js";
+import { asked } from "./photo_sight.js";
 import { MadeBox, PointsTool } from "./points_tool.js";
 import { ExportPanel } from "./export/panel.js";
 
@@ -38,6 +39,9 @@ export function Stage({ view }) {
       location.origin,
     );
   useSignalEffect(tellBridge);
+  useSignalEffect(() => {
+    if (asked.value !== null) frame.current?.contentWindow?.postMessage(asked.value, location.origin);
+  });
 
   const filled = store.mode.value === "export" || store.tool.value === "points";
   return html`<main class="stage" aria-label="Scene">
@@ -70,7 +74,7 @@ function Overlays() {
       </div>
       <${FrameSteps} />
       ${inFrame
-        ? html`<div class="chip" title="Wheel: zoom. Drag: pan. 0: fit.">${store.zoom.value.toFixed(1)}x</div>
+        ? html`<div class="chip" title="Wheel: zoom. Drag: pan. L: zoom to the selected box. 0: the whole photo.">${store.zoom.value.toFixed(1)}x</div>
             <button class="chip button" onClick=${() => store.actions.leaveFrame()} title="Leave the frame (F)">Leave</button>`
         : html`<button class="chip button" onClick=${() => store.actions.enterFrame()} title="Enter this frame (F)">
             <${Icon} name="image" size=${14} />Enter

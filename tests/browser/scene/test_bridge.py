@@ -10,12 +10,13 @@ import pytest
 import viser
 
 from ars_web.geometry import rigid_transform
+from ars_web.geometry.box import Box
 from ars_web.geometry.camera import Camera
 from ars_web.scene.boxes import BoxNodes
 from ars_web.scene.extent import Lens
 from ars_web.scene.frame_view import FrameView
 from ars_web.scene.photos import Photos
-from ars_web.sessions.model import FrameTable
+from ars_web.sessions.model import FrameTable, ObjectClass, SessionState, VirtualBox
 from ars_web.workspace import Entered
 
 LENS = Lens(fov=0.9, near=0.01, far=1000.0)
@@ -31,6 +32,10 @@ OPACITY = """() => {
 }"""
 
 
+def looking(eye: np.ndarray, about_x: float) -> np.ndarray:
+    return rigid_transform.from_rotation(cv2.Rodrigues(np.array([about_x, 0.3, 0.2]))[0], eye)
+
+
 @pytest.fixture
 def in_frame(
     scene_page: Callable[..., Any], viser_server: viser.ViserServer, tmp_path: Path, until: Callable[..., None]
@@ -39,12 +44,13 @@ def in_frame(
     image = np.full((480, 640, 3), 128, dtype=np.uint8)
     for i in range(2):
         assert cv2.imwrite(str(tmp_path / f"{i}.jpg"), image + i)
-    Ts = np.tile(rigid_transform.from_rotation(cv2.Rodrigues(np.array([-2.0, 0.3, 0.2]))[0], np.ones(3)), (2, 1, 1))
+    Ts = np.stack([looking(np.ones(3), -2.0), looking(np.array([1.1, 0.9, 1.0]), -2.1)])
     frames = FrameTable(("0.jpg", "1.jpg"), (tmp_path / "0.jpg", tmp_path / "1.jpg"), np.zeros(2, dtype=int), Ts)
     photos = Photos({0: CAMERA}, frames)
     page = scene_page(1000, 700)
     page.told_by_view = []
     nodes = BoxNodes(viser_server)
+    page.nodes = nodes
     page.view = FrameView(page.client, photos=photos, nodes=nodes, poses=Ts, lens=LENS, send=page.told_by_view.append)
     page.tell_bridge(mode="frame", blend=1, dark=True)
     page.view.enter(0)
@@ -53,6 +59,12 @@ def in_frame(
     yield page
     page.view.close()
     photos.close()
+
+
+def ask(in_frame: Any, message: str) -> None:
+    """Tell the bridge something else than what is to be seen."""
+    in_frame.page.evaluate(f"frames[0].postMessage({message}, location.origin)")
+    in_frame.settle()
 
 
 def test_the_camera_is_locked_in_a_frame_and_free_after(in_frame: Any, until: Callable[..., None]) -> None:
@@ -122,8 +134,48 @@ def test_zoom_has_its_limits_and_fits_again(in_frame: Any, until: Callable[..., 
     until(lambda: in_frame.told("zoom")[-1]["zoom"] == 1, page=page)
     page.mouse.wheel(0, -400)
     until(lambda: in_frame.told("zoom")[-1]["zoom"] > 1, page=page)
-    in_frame.page.evaluate("frames[0].postMessage({ars: 'fit'}, location.origin)")
+    ask(in_frame, "{ars: 'fit'}")
     until(lambda: in_frame.told("zoom")[-1]["zoom"] == 1, page=page)
+    ask(in_frame, "{ars: 'zoom', by: 2.5}")
+    until(lambda: in_frame.told("zoom")[-1]["zoom"] == 2.5, page=page)
+    for nonsense in ("'2'", "-1", "0", "NaN", "Infinity"):
+        ask(in_frame, f"{{ars: 'zoom', by: {nonsense}}}")
+    assert in_frame.told("zoom")[-1]["zoom"] == 2.5
+
+
+def test_the_view_stays_with_a_box_from_frame_to_frame(in_frame: Any, until: Callable[..., None]) -> None:
+    page, middle = in_frame.page, np.array([500.0, 350.0])
+    centre = rigid_transform.transform_points(in_frame.view._poses[0], np.array([[0.1, -0.05, 1.0]]))[0]
+    box = Box(rigid_transform.from_rotation(rigid_transform.rotation_about_z(0.3), centre), np.full(3, 0.08))
+    stored = VirtualBox(7, 0, "mug", box, has_hull=False, revision=1)
+    in_frame.nodes.show(SessionState(1, "s", {0: ObjectClass(0, "mug", "#56b4e9", 1)}, {7: stored}, 1, 2))
+    in_frame.scene.wait_for_function("() => Boolean(__viserMutable.nodeRefFromName['/boxes/7/at/edges'])")
+
+    def seen() -> tuple[np.ndarray, float]:
+        """Where the box's middle is on the screen, and how much of it the box takes."""
+        corners = np.array([in_frame.screen_of(corner) for corner in box.corners_world])
+        least, most = corners.min(axis=0), corners.max(axis=0)
+        return (least + most) / 2, float(((most - least) / (1000, 700)).max())
+
+    ask(in_frame, "{ars: 'show', box: 8}")  # there is none
+    assert in_frame.told("zoom") == []
+    ask(in_frame, "{ars: 'show', box: 7}")
+    until(lambda: bool(in_frame.told("zoom")), page=page)
+    in_frame.settle()
+    at, share = seen()
+    assert at == pytest.approx(middle, abs=1.0)
+    assert share == pytest.approx(0.6, abs=0.01)
+
+    in_frame.view.enter(1)  # which sees it elsewhere
+    until(lambda: in_frame.view.frame == 1 and np.abs(seen()[0] - middle).max() < 1.0, page=page)
+
+    page.mouse.move(500, 350)
+    page.mouse.wheel(0, -100)  # from here on the view is where it is put by hand
+    until(lambda: seen()[1] > 0.65, page=page)
+    in_frame.view.enter(0)
+    until(lambda: in_frame.view.frame == 0, page=page)
+    in_frame.settle()
+    assert np.abs(seen()[0] - middle).max() > 20
 
 
 def test_a_drag_on_nothing_moves_the_zoomed_view_with_the_pointer(in_frame: Any, until: Callable[..., None]) -> None:
