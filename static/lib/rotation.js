@@ -113,6 +113,20 @@ export function rotatedByDegrees(wxyz, degrees, axes) {
   return axes === "box" ? composed(wxyz, turn) : composed(turn, wxyz);
 }
 
+/**
+ * Turned by the least angle that makes one of the box's axes vertical.
+ * @param {Readonly<Quaternion>} wxyz
+ * @returns {Quaternion}
+ */
+export function uprighted(wxyz) {
+  /** @type {Vector[]} */
+  const axes = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+  const [x, y, z] = axes.map((axis) => rotated(wxyz, axis)).reduce((best, axis) => (Math.abs(axis[2]) > Math.abs(best[2]) ? axis : best));
+  const up = z < 0 ? -1 : 1;
+  // Half way from that axis to the vertical, z is 1/sqrt(3) at least.
+  return composed(unit([1 + up * z, up * y, -up * x, 0]), wxyz);
+}
+
 /** To -180 up to 180, 180 included. @param {number} degrees */
 export function wrapped(degrees) {
   const turned = degrees - 360 * Math.round(degrees / 360);

@@ -92,7 +92,7 @@ function Numbers({ box }) {
               title=${ROWS[row].title} locked=${box.locked} value=${values[row][axis]} ...${LOOKS[row]}
               onCommit=${(/** @type {number} */ value) => commit(row, axis, value)}
               onStep=${(/** @type {number} */ value, /** @type {boolean} */ hold) => store.actions.editBox(box.id, changed(row, axis, value), hold)}
-              onStepped=${() => void store.actions.finishEdit()} onLeave=${focusList}
+              onStepped=${() => void store.actions.finishEdit()} onLeave=${leave}
             />`,
           )}
         </div>`,
@@ -165,7 +165,7 @@ function Buttons({ box }) {
       <div class="joined" role="group" aria-label="Axes">${axesButton("box")}${axesButton("world")}</div>
       <button
         class="button small" aria-pressed=${store.upright.value} onClick=${command("upright").run}
-        title=${`Turn about the world's z only (${command("upright").keys[0]})`}
+        title=${`Stand the box upright, and turn it about the world's z only (${command("upright").keys[0]})`}
       >Upright</button>
       <${SnapButton} />
     </div>
@@ -175,8 +175,9 @@ function Buttons({ box }) {
     </div>`;
 }
 
-function focusList() {
-  /** @type {HTMLElement | null} */ (document.querySelector(".boxes-list"))?.focus();
+/** Out of the fields, to where the arrows nudge the box: in the list of boxes they would choose another. */
+function leave() {
+  /** @type {HTMLElement | null} */ (document.activeElement)?.blur();
 }
 
 /**

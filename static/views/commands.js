@@ -1,5 +1,6 @@
 /** Everything frequent, once: what the keys, the palette, the key list and the tool rail all take from. */
 
+import { angleBetween, uprighted } from "../lib/rotation.js";
 import * as store from "../store.js";
 import * as sight from "./photo_sight.js";
 
@@ -14,6 +15,9 @@ import * as sight from "./photo_sight.js";
  */
 
 const { actions } = store;
+
+/** Radians, by which a box may lean and stand upright: far less than is seen. */
+const TILT = 1e-6;
 
 const hasBox = () => store.selectedBox.value !== null;
 const canEdit = () => hasBox() && !store.selectedBox.value?.locked;
@@ -43,6 +47,17 @@ function take(tool) {
 
 /** In a frame, where the camera stays, the photo is zoomed to the box instead. */
 const lookAtBox = () => (inFrame() ? sight.zoomToBox() : actions.look("selected"));
+
+/** What is to be kept upright is stood upright first. */
+function keepUpright() {
+  store.upright.value = !store.upright.value;
+  const box = store.selectedBox.value;
+  if (!store.upright.value || box === null || box.locked) return;
+  const { position, wxyz } = box.T_world_box;
+  const standing = uprighted(wxyz);
+  if (angleBetween(standing, wxyz) < TILT) return;
+  actions.editBox(box.id, { size: box.size, T_world_box: { position, wxyz: standing } });
+}
 
 /** @param {number} step */
 const stepFrame = (step) => actions.goTo(store.frame.value + step);
@@ -167,7 +182,7 @@ export const commands = [
     keys: ["T"],
     run: () => (store.axes.value = store.axes.value === "box" ? "world" : "box"),
   },
-  { id: "upright", title: "Keep upright", group: "Tools", keys: ["U"], run: () => (store.upright.value = !store.upright.value) },
+  { id: "upright", title: "Stand upright, and keep so", group: "Tools", keys: ["U"], run: keepUpright },
   {
     id: "snap",
     title: "Snap to 1 mm and 1°",

@@ -92,7 +92,7 @@ function Overlays() {
       <button class="chip button" aria-pressed=${store.snapLength.value > 0 || store.snapAngle.value > 0} onClick=${command("snap").run} title="Snap (N)">
         ${snapWords()}
       </button>
-      <button class="chip button" aria-pressed=${store.upright.value} onClick=${command("upright").run} title="Keep boxes upright (U)">Upright</button>
+      <button class="chip button" aria-pressed=${store.upright.value} onClick=${command("upright").run} title="Stand the selected box upright, and turn boxes about the vertical only (U)">Upright</button>
     </div>
     ${drag !== null && html`<div class="readout" style=${{ left: `${drag.x + 16}px`, top: `${drag.y + 12}px` }}>${drag.text}</div>`}
     ${problem !== undefined &&
