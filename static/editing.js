@@ -28,6 +28,12 @@ const made = new Map();
 /** @param {(message: object) => void} send to the scene, over the live line */
 export function connect(send) {
   tell = send;
+  let newest = 0;
+  effect(() => {
+    // The server went back to an earlier state: what this page has made since is no part of it.
+    if (store.revision.value < newest) made.clear();
+    newest = store.revision.value;
+  });
 }
 
 /**

@@ -11,8 +11,10 @@ import * as store from "./store.js";
 const PATIENCE = [200, 500, 1000, 2000, 4000];
 /** Milliseconds without a word after which a line is taken for dead: the server says something every 15 seconds. */
 const SILENCE = 40_000;
-/** Closed for good: the session is not there, or this browser is logged out. */
-const HOPELESS = new Set([4404, 1008]);
+/** The session was deleted. */
+const GONE = 4410;
+/** Closed for good: a new line would fare no better. See `Close` in api/live_line.py; 1009: the view is too large. */
+const HOPELESS = new Set([1008, 1009, 4400, 4403, 4404, 4409, 4410]);
 
 /** The page's own name, also that of its scene. */
 export const view = api.randomName();
@@ -20,6 +22,10 @@ export const view = api.randomName();
 /** @type {{send: (message: object) => void, close: () => void} | null} */
 let line = null;
 let failures = 0;
+/** Whether the server has let the line in that is there now, or was last. */
+let letIn = false;
+/** Edits that come while the session is read anew; null: it is not. @type {import("./store.js").Edit[] | null} */
+let meanwhile = null;
 
 /** @param {object} message dropped while the line is lost: the view is sent whole when it is open again */
 export function send(message) {
@@ -50,6 +56,21 @@ async function load() {
   });
 }
 
+/** The server went back to an earlier state, as from a backup: what this page knew is worth nothing. */
+async function loadAnew() {
+  meanwhile = [];
+  try {
+    await load();
+  } catch (error) {
+    if (!(error instanceof api.ApiError)) throw error;
+    store.setProblem("page", error.message);
+  } finally {
+    const edits = meanwhile;
+    meanwhile = null;
+    batch(() => edits.forEach(takeEdit));
+  }
+}
+
 /** @type {ReturnType<typeof setTimeout> | undefined} */
 let waiting;
 /** @type {ReturnType<typeof setTimeout> | undefined} */
@@ -59,9 +80,11 @@ let heardAt = 0;
 function connect() {
   clearTimeout(waiting);
   waiting = undefined;
+  letIn = false;
   line = api.openLine(store.sid.value, view, store.revision.value, {
     opened: () => {
       failures = 0;
+      letIn = true;
       store.line.value = "open";
       store.setProblem("page", null);
       sayHello();
@@ -82,11 +105,29 @@ function lost(code, reason) {
   line = null;
   store.people.value = [];
   store.line.value = "lost";
+  // The server has cancelled drags of this page; of others' nothing is heard any more.
+  store.preview.value = null;
+  store.dragged.value = null;
   if (HOPELESS.has(code)) {
-    store.setProblem("page", reason || "The session cannot be reached any more. Load the page again.");
+    // That the session was deleted has been said, with the remedy.
+    if (code !== GONE) store.setProblem("page", `${reason || "The session cannot be reached any more"}. Load the page again.`);
     return;
   }
+  if (!letIn) void lookForLogin();
   waiting = setTimeout(connect, PATIENCE[Math.min(failures++, PATIENCE.length - 1)]);
+}
+
+/** Browsers do not tell why a line was not let in. */
+async function lookForLogin() {
+  try {
+    await api.session(store.sid.value);
+  } catch (error) {
+    if (!(error instanceof api.ApiError)) throw error;
+    if (error.status !== 401) return;
+    // The server answers with the page that says how to log in.
+    if (store.unsaved.value === 0) location.reload();
+    else store.setProblem("page", "This browser is logged out. Log in in another tab: what is not saved yet is saved then.");
+  }
 }
 
 function heard() {
@@ -141,10 +182,11 @@ function take(message) {
     case "ready":
       return;
     case "reset":
-      void load();
+      void loadAnew();
       return;
     case "edit":
-      batch(() => takeEdit(message.edit));
+      if (meanwhile !== null) meanwhile.push(message.edit);
+      else batch(() => takeEdit(message.edit));
       return;
     case "gone":
       store.setProblem("page", "This session was deleted. It can be brought back from the sessions page.");
