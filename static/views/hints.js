@@ -6,8 +6,8 @@ import * as store from "../store.js";
 const SEEN = "ars-web.hints-seen";
 
 const HINTS = [
-  ["Walk the recording", "Each point is a camera. Click one, or a picture in the strip below, and press F: you stand where it stood, its photo behind the boxes."],
-  ["Correct a box", "Click a box, then G moves it, R turns it, S resizes it by its faces. Or type its numbers on the right: 85/2 and 8.5 cm work."],
+  ["Walk the recording", "Each point is a camera. Click one to stand where it stood, its photo behind the boxes; or choose a picture in the strip below and press F, which also leads back."],
+  ["Correct a box", "Click a box; in a frame, L zooms to it. G moves it, R turns it, S resizes it by its faces, U stands it upright. Or type its numbers on the right: 85/2 and 8.5 cm work."],
   ["Look where errors show", "The six pictures on the right are the frames in which an error of the selected box shows most. They follow while you edit."],
   ["Nothing is lost", "Every change is saved at once. Ctrl+Z takes back yours, never another's; History shows all of them."],
   ["Every key", "Press ? for the keys and Ctrl+K for everything by its name. When the boxes fit, Export writes the training set."],
