@@ -135,9 +135,11 @@ async function openWorkspace(id) {
   render(h(Workspace, { view: line.view }), PAGE);
 }
 
-/** Whether a key goes into text. @param {KeyboardEvent} event */
-function isTyping({ target, ctrlKey, metaKey }) {
+/** Whether a key goes into a field. @param {KeyboardEvent} event */
+function isTyping({ target, key, ctrlKey, metaKey }) {
   if (!(target instanceof HTMLElement)) return false;
+  // Sliders and choices are moved by these.
+  if (target instanceof HTMLInputElement && ["range", "radio"].includes(target.type) && /^(Arrow|Page|Home|End)/.test(key)) return true;
   // A number that nothing was typed into has nothing of its own to undo.
   if ((ctrlKey || metaKey) && target.dataset.typing === "false") return false;
   const takesText = target instanceof HTMLInputElement && !["range", "checkbox", "radio", "color"].includes(target.type);

@@ -12,6 +12,7 @@ import * as sight from "./photo_sight.js";
  * @property {string[]} keys as `chord` writes them; the first is shown
  * @property {() => void} run
  * @property {() => boolean} [when] whether it can be done now
+ * @property {boolean} [repeats] it is done again and again while its key is held down
  */
 
 const { actions } = store;
@@ -106,6 +107,7 @@ function arrows() {
       keys: [times === 10 ? `Shift+${key}` : key],
       run: () => arrow(axis, sign, times),
       when: () => inPlace() && (axis === 0 || hasBox()),
+      repeats: true,
     })),
   );
 }
@@ -140,8 +142,8 @@ export const commands = [
     run: () => (store.blend.value = store.blend.value > 0 ? 0 : 1),
     when: inFrame,
   },
-  { id: "zoom-in", title: "Zoom in", group: "View", keys: ["+", "="], run: sight.zoomIn, when: inFrame },
-  { id: "zoom-out", title: "Zoom out", group: "View", keys: ["-"], run: sight.zoomOut, when: inFrame },
+  { id: "zoom-in", title: "Zoom in", group: "View", keys: ["+", "="], run: sight.zoomIn, when: inFrame, repeats: true },
+  { id: "zoom-out", title: "Zoom out", group: "View", keys: ["-"], run: sight.zoomOut, when: inFrame, repeats: true },
   { id: "whole-photo", title: "Whole photo", group: "View", keys: ["0"], run: sight.wholePhoto, when: inFrame },
   {
     id: "theme",
@@ -151,10 +153,10 @@ export const commands = [
     run: () => (store.theme.value = store.theme.value === "dark" ? "light" : "dark"),
   },
 
-  { id: "next", title: "Next frame", group: "Frames", keys: ["."], run: () => stepFrame(1) },
-  { id: "previous", title: "Previous frame", group: "Frames", keys: [","], run: () => stepFrame(-1) },
-  { id: "jump-on", title: "Jump on", group: "Frames", keys: ["Shift+."], run: () => stepFrame(store.jump.value) },
-  { id: "jump-back", title: "Jump back", group: "Frames", keys: ["Shift+,"], run: () => stepFrame(-store.jump.value) },
+  { id: "next", title: "Next frame", group: "Frames", keys: ["."], run: () => stepFrame(1), repeats: true },
+  { id: "previous", title: "Previous frame", group: "Frames", keys: [","], run: () => stepFrame(-1), repeats: true },
+  { id: "jump-on", title: "Jump on", group: "Frames", keys: ["Shift+."], run: () => stepFrame(store.jump.value), repeats: true },
+  { id: "jump-back", title: "Jump back", group: "Frames", keys: ["Shift+,"], run: () => stepFrame(-store.jump.value), repeats: true },
   { id: "first", title: "First frame", group: "Frames", keys: ["Ctrl+Home"], run: () => actions.goTo(0) },
   { id: "last", title: "Last frame", group: "Frames", keys: ["Ctrl+End"], run: () => actions.goTo(store.frames.value - 1) },
 
@@ -228,11 +230,11 @@ export const commands = [
     run: () => onBox((id) => actions.changeBox(id, { locked: !store.selectedBox.value?.locked })),
     when: hasBox,
   },
-  { id: "next-box", title: "Next box", group: "Box", keys: ["]"], run: () => stepBox(1), when: () => store.boxes.value.size > 0 },
-  { id: "previous-box", title: "Previous box", group: "Box", keys: ["["], run: () => stepBox(-1), when: () => store.boxes.value.size > 0 },
+  { id: "next-box", title: "Next box", group: "Box", keys: ["]"], run: () => stepBox(1), when: () => store.boxes.value.size > 0, repeats: true },
+  { id: "previous-box", title: "Previous box", group: "Box", keys: ["["], run: () => stepBox(-1), when: () => store.boxes.value.size > 0, repeats: true },
 
-  { id: "undo", title: "Undo", group: "Session", keys: ["Ctrl+Z"], run: () => void actions.undo() },
-  { id: "redo", title: "Redo", group: "Session", keys: ["Ctrl+Shift+Z", "Ctrl+Y"], run: () => void actions.redo() },
+  { id: "undo", title: "Undo", group: "Session", keys: ["Ctrl+Z"], run: () => void actions.undo(), repeats: true },
+  { id: "redo", title: "Redo", group: "Session", keys: ["Ctrl+Shift+Z", "Ctrl+Y"], run: () => void actions.redo(), repeats: true },
   {
     id: "history",
     title: "History",
@@ -281,15 +283,17 @@ export function chord({ key, code, ctrlKey, metaKey, shiftKey }) {
 
 /**
  * Run what a key stands for.
- * @param {Parameters<typeof chord>[0] & {altKey: boolean}} event
+ * @param {Parameters<typeof chord>[0] & {altKey: boolean, repeat?: boolean}} event
  * @returns {boolean} whether it stood for something that can be done now
  */
 export function press(event) {
-  if (event.altKey) return false;
-  const written = chord(event);
+  // Many keyboards write brackets by AltGr, which some systems tell as Alt or as Ctrl and Alt.
+  const bracket = /^[[\]]$/.test(event.key);
+  if (event.altKey && !bracket) return false;
+  const written = bracket ? event.key : chord(event);
   const found = commands.find((one) => one.keys.includes(written) && (one.when?.() ?? true));
   // What lies over the workspace has keys of its own.
   if (found === undefined || (store.overlay.value !== null && found.id !== "back")) return false;
-  found.run();
+  if (!event.repeat || found.repeats) found.run();
   return true;
 }

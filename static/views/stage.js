@@ -23,7 +23,7 @@ export function Stage({ view }) {
         ready.value = true;
         tellBridge();
       } else if (told?.ars === "key" && told.type === "keydown") {
-        press({ key: told.key, code: told.code, ctrlKey: told.ctrl, metaKey: told.meta, shiftKey: told.shift, altKey: told.alt });
+        press({ key: told.key, code: told.code, ctrlKey: told.ctrl, metaKey: told.meta, shiftKey: told.shift, altKey: told.alt, repeat: told.repeat });
       } else if (told?.ars === "zoom") store.zoom.value = told.zoom;
       else if (told?.ars === "pointer" && store.dragged.value !== null) {
         store.dragged.value = { ...store.dragged.value, x: told.x, y: told.y };

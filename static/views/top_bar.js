@@ -37,6 +37,7 @@ export function TopBar() {
 
 function SessionName() {
   const editing = useSignal(false);
+  const busy = useRef(false);
   const wrong = useSignal(/** @type {string | null} */ (null));
   const name = store.session.value?.name ?? "";
   if (!editing.value) {
@@ -48,14 +49,18 @@ function SessionName() {
   };
   /** @param {HTMLInputElement} input */
   const keep = async (input) => {
+    // The field loses the focus as it goes, too: after Escape, and after it was kept.
+    if (!editing.value || busy.current) return;
     const wanted = input.value.trim();
     if (wanted === name || wanted === "") return leave();
+    busy.current = true;
     try {
       await store.actions.renameSession(wanted);
       leave();
     } catch (error) {
       wrong.value = /** @type {Error} */ (error).message;
     }
+    busy.current = false;
   };
   return html`<input
       class="session-name" aria-label="Name of the session" value=${name} maxlength="200"
