@@ -34,8 +34,10 @@ class Page:
 
     def people(self, until: Callable[[list[dict[str, Any]]], bool]) -> list[dict[str, Any]]:
         """Who is there, once that is as it should be."""
+        deadline = time.monotonic() + PATIENCE
         while not until(people := self.next("here")["people"]):
-            pass
+            # It is told again and again, so that waiting for the next alone would never end.
+            assert time.monotonic() < deadline, people
         return people
 
 
