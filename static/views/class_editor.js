@@ -56,7 +56,10 @@ export function ClassEditor({ one, anchor, onClose }) {
       <input
         class="field" value=${name.value ?? one.name} maxlength="200" autocomplete="off" aria-invalid=${problem.value?.at === "name"}
         onInput=${(/** @type {any} */ event) => (name.value = event.currentTarget.value)} onBlur=${rename}
-        onKeyDown=${(/** @type {KeyboardEvent} */ event) => event.key === "Enter" && void rename()}
+        onKeyDown=${(/** @type {KeyboardEvent} */ event) => {
+          if (event.key === "Enter") void rename();
+          if (event.key === "Escape") name.value = null; // or it would be kept as the field goes
+        }}
       />
     </label>
     ${wrong("name")}
@@ -108,7 +111,11 @@ function UsualSize({ one, resize }) {
               drafts.value = drafts.value.map((draft, at) => (at === i ? typed : draft));
               problem.value = null;
             }}
-            onBlur=${() => void commit()} onKeyDown=${(/** @type {KeyboardEvent} */ event) => event.key === "Enter" && void commit()}
+            onBlur=${() => void commit()}
+            onKeyDown=${(/** @type {KeyboardEvent} */ event) => {
+              if (event.key === "Enter") void commit();
+              if (event.key === "Escape") drafts.value = [null, null, null];
+            }}
           />`,
         )}
       </span>

@@ -50,8 +50,10 @@ def test_classes_are_added_changed_and_kept_while_used(boxed_session, open_panel
         editor = page.get_by_role("dialog", name=f"Class {first['name']}")
         editor.get_by_role("button", name="Delete class").click()
         expect(editor.get_by_role("alert")).to_contain_text("used by")
-        page.keyboard.press("Escape")
+        editor.get_by_role("textbox", name="Name").fill("not this")
+        page.keyboard.press("Escape")  # keeps nothing of what is typed
         expect(editor).to_have_count(0)
         expect(entry).to_be_focused()
         assert [c["name"] for c in panel.answer("/classes")].count(first["name"]) == 1
+        panel.saved(6)
         panel.expect_refusals(409, 412, 422)
