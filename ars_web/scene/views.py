@@ -84,6 +84,7 @@ class ClientView:
         self._state = ViewState()
         self._dark: bool | None = None
         self._entered: int | None = None
+        self._began_in_frame: bool | None = None
         self._thumbnail: asyncio.Task[None] | None = None
         self._closed = False
         recording = surroundings.recording
@@ -116,10 +117,16 @@ class ClientView:
         self._boxes.show(hidden=state.hidden, selected=state.selected)
         self._editor.show(state)
         in_frame = state.mode == "frame"
+        if self._began_in_frame is None:
+            self._began_in_frame = in_frame
         try:
             if not in_frame:
                 self._entered = None
                 self._frame.leave()
+                if self._began_in_frame:
+                    # The browser had not yet put its free camera anywhere when it stepped into the frame.
+                    self._began_in_frame = False
+                    self._look(Look("all"))
             elif self._entered != state.frame:
                 self._entered = state.frame
                 self._frame.enter(state.frame)

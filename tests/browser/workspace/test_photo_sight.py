@@ -39,3 +39,25 @@ def test_keys_zoom_the_photo_to_the_box_and_back(
         workspace.until(lambda: zoom() == 1)
         page.keyboard.press("+")
         workspace.until(lambda: zoom() == pytest.approx(1.25))
+
+
+def test_a_frame_that_a_page_began_in_is_left_for_the_whole_recording(
+    open_workspace: Callable[..., Any], mug: tuple[Path, str, int]
+) -> None:
+    sessions, sid, _ = mug
+    with open_workspace(sessions) as (_, _, page_of):
+
+        def place(workspace: Any) -> Any:
+            return workspace.scene.evaluate("() => window.__viserMutable.camera.position.toArray()")
+
+        workspace = page_of(sid).open()
+        whole = place(workspace)
+        workspace.open("#frame=1&mode=frame")
+        workspace.page.reload()  # an address that differs in this alone is no other page
+        workspace.settle()
+        workspace.until(
+            lambda: workspace.page.evaluate("import('/static/store.js').then((store) => store.entered.value)") == 1
+        )
+        assert place(workspace) != pytest.approx(whole, abs=0.01)
+        workspace.page.keyboard.press("f")
+        workspace.until(lambda: place(workspace) == pytest.approx(whole, abs=0.01))
