@@ -215,7 +215,7 @@ class BoxEditor:
             storing = self._workers.submit(self._store, drag)
             self._storing[drag.box_id] = storing
             self._offer()
-        storing.add_done_callback(lambda done: self._stored(drag.box_id, done))
+        storing.add_done_callback(lambda done: self._stored(drag, done))
 
     def _store(self, drag: _Drag) -> VirtualBox | None:
         """Store a drag, on a worker; None where that was refused, which has been told then."""
@@ -237,14 +237,16 @@ class BoxEditor:
         self._tell(Dragged("end", BoxPreview(drag.box_id, stored.box), drag.last.text, own=True))
         return stored
 
-    def _stored(self, box_id: int, done: "Future[VirtualBox | None]") -> None:
+    def _stored(self, drag: _Drag, done: "Future[VirtualBox | None]") -> None:
         with self._lock:
-            if self._storing.get(box_id) is done:
-                del self._storing[box_id]
+            if self._storing.get(drag.box_id) is done:
+                del self._storing[drag.box_id]
         error = None if done.cancelled() else done.exception()
         if error is not None:
-            log.error("a drag of box %d cannot be stored", box_id, exc_info=error)
+            log.error("a drag of box %d cannot be stored", drag.box_id, exc_info=error)
             self._nodes.preview(None, by=self._by)
+            self._tell(Refused("the box could not be stored, by a fault in the program; see its log"))
+            self._tell(Dragged("cancel", BoxPreview(drag.box_id, drag.start), "", own=True))
 
 
 def _same(a: Box, b: Box) -> bool:

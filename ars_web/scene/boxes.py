@@ -66,6 +66,7 @@ class BoxNodes:
         self._boxes: dict[int, VirtualBox] = {}
         self._classes: dict[int, ObjectClass] = {}
         self._previews: dict[str, BoxPreview] = {}
+        self._revision = -1
         self._watchers: list[Watcher] = []
 
     def show(self, state: SessionState) -> None:
@@ -83,7 +84,7 @@ class BoxNodes:
             }
             recoloured = {c.id for c in state.classes.values() if c != self._classes.get(c.id)}
             changed |= {box.id for box in boxes.values() if box.class_id in recoloured}
-            self._boxes, self._classes = boxes, dict(state.classes)
+            self._boxes, self._classes, self._revision = boxes, dict(state.classes), state.revision
             self._draw(changed)
 
     def preview(self, preview: BoxPreview | None, *, by: str = "") -> None:
@@ -95,10 +96,13 @@ class BoxNodes:
             self._draw({p.box_id for p in (before, preview) if p is not None})
 
     def settle(self, box: VirtualBox) -> None:
-        """Draw a box as it has just been stored, and hold no more previews of it."""
+        """Draw a box as it has just been stored, and hold no more previews of it.
+
+        A state that came in between knows better: the box may have been deleted since.
+        """
         with self.lock:
             known = self._boxes.get(box.id)
-            if known is None or known.revision < box.revision:
+            if box.revision > self._revision and (known is None or known.revision < box.revision):
                 self._boxes[box.id] = box
             self._previews = {by: p for by, p in self._previews.items() if p.box_id != box.id}
             self._draw({box.id})

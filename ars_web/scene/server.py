@@ -108,6 +108,7 @@ class SceneServers:
             known = self._attached.get(sid, {}).get(view)
         if known is not None and known.page.author != author:
             raise BadInput("this view is somebody else's page; choose another random name")
+        self._store.revision(sid)  # a scene may outlive its session, for as long as somebody looks
         scene = self._opened(sid)
         return SceneAddress(
             url=f"ws://127.0.0.1:{scene.port}/",

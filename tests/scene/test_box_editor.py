@@ -296,3 +296,18 @@ def test_a_new_box_before_any_scene_is_open_is_refused_in_words(scenes: SceneSer
     scenes.attach(sid, VIEW, author="page-a", send=told.append)
     scenes.act(sid, VIEW, NewBox(0))
     assert told == [Refused("the 3D scene is not connected yet; add the box once it shows")]
+
+
+def test_a_fault_in_storing_a_drag_ends_it_for_the_page(
+    page: Page, editor: SessionEditor, store: SessionStore, sid: str, monkeypatch: pytest.MonkeyPatch, until: Callable
+) -> None:
+    def fault(*_: Any, **__: Any) -> None:
+        raise RuntimeError("a fault of this program")
+
+    monkeypatch.setattr(editor, "change_box", fault)
+    page.show(selected=1, tool="move")
+    page.grab()
+    page.drag(moved(page.pose(), 0.1, 0.0, 0.0))
+    page.let_go()
+    until(lambda: [event.phase for event in page.of(Dragged)][-1:] == ["cancel"])
+    assert "fault" in page.of(Refused)[0].detail

@@ -8,7 +8,8 @@ import pytest
 
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box
-from ars_web.scene.boxes import rgb
+from ars_web.scene.boxes import BoxNodes, rgb
+from ars_web.scene.hardening import guarded_server
 from ars_web.scene.server import SceneServers
 from ars_web.sessions.editing import SessionEditor
 from ars_web.sessions.store import SessionStore
@@ -122,3 +123,23 @@ def test_the_selected_box_has_a_thicker_line_that_follows_previews(
     at(visitor, "/boxes/1/at", position=box.T_world_box[:3, 3])
     scenes.show(sid, VIEW, ViewState(selected=None))
     at(visitor, "/boxes/1/at/selected", visible=False)
+
+
+def test_a_box_that_was_deleted_since_it_was_stored_is_not_drawn_again(
+    editor: SessionEditor, store: SessionStore, sid: str
+) -> None:
+    server = guarded_server()
+    try:
+        nodes = BoxNodes(server)
+        before = store.state(sid).boxes[1]
+        nodes.show(store.state(sid))
+        T = moved(before.box, 0.1, 0.0, 0.0)
+        stored = editor.change_box(sid, 1, expected_revision=before.revision, T_world_box=T, author="a")
+        nodes.settle(stored)
+        assert nodes.stored(1) == stored
+        editor.delete_box(sid, 1, expected_revision=stored.revision, author="b")
+        nodes.show(store.state(sid))
+        nodes.settle(stored)  # by a thread that was slow
+        assert nodes.stored(1) is None
+    finally:
+        server.stop()

@@ -308,6 +308,8 @@ def test_a_deleted_session_keeps_those_who_look_from_harm(
         visitor.listen_until(lambda v: "/current/photo" in v.nodes)
         store.delete(sid)
         visitor.click(np.zeros(3), np.ones(3))
+        with pytest.raises(NotFound):
+            servers.address(sid, view="", author="api")
     servers.idle_seconds = 0.0
     until(lambda: servers.open_sessions == frozenset())
 
