@@ -24,7 +24,10 @@ Object.assign(
     deleteBox: editing.deleteBox,
     duplicateBox: editing.duplicateBox,
     restOnGround: editing.restOnGround,
-    newBox: (classId) => line.send({ type: "new-box", class_id: classId }),
+    newBox: (classId) => {
+      if (store.line.value === "open") line.send({ type: "new-box", class_id: classId });
+      else store.setProblem("boxes", "The server is not reached just now: add the box once it is.");
+    },
     boxFromPoints: editing.boxFromPoints,
     locatePoint: (observations) => api.locatePoint(sid(), observations),
     epipolar: async (of, frame) => (await api.epipolar(sid(), of, frame)).lines,

@@ -65,7 +65,7 @@
    * @property {HTMLCanvasElement} canvas
    * @property {Camera} camera
    * @property {Controls} cameraControl
-   * @property {Record<string, Node | undefined>} nodeRefFromName
+   * @property {Record<string, Node | null | undefined>} nodeRefFromName null: not there any more
    * @property {() => void} requestRender
    */
 
@@ -181,7 +181,7 @@
     camera.updateWorldMatrix(true, false);
     const from = [...camera.matrixWorld.toArray(), fov.base, width, height].join();
     const node = nodeRefFromName[edgesOf(follows.box)];
-    if (from === follows.from || node === undefined || !isVisible(node)) return;
+    if (from === follows.from || node == null || !isVisible(node)) return;
     follows.from = from;
     let unit = node; // what is scaled to the box's size is in it
     node.traverse((each) => void (each.material !== undefined && (unit = each)));
@@ -366,8 +366,10 @@
   function dress(viser) {
     const { camera, canvas } = viser;
     const bounds = canvas.getBoundingClientRect();
+    // After an interruption viser begins with an empty scene.
+    for (const [name, dot] of dots) if (viser.nodeRefFromName[name] == null) dot.hidden = true;
     for (const [name, node] of Object.entries(viser.nodeRefFromName)) {
-      if (!name.startsWith(HANDLES) || node === undefined) continue;
+      if (!name.startsWith(HANDLES) || node == null) continue;
       const eye = camera.position.clone().setFromMatrixPosition(node.matrixWorld).applyMatrix4(camera.matrixWorldInverse);
       const depth = -eye.z;
       const shown = depth > 0 && isVisible(node);

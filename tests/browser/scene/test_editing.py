@@ -192,6 +192,16 @@ def test_dots_are_on_the_faces_and_as_large_on_the_screen_from_near_and_far(
     until(lambda: page.scene.locator(".ars-dot:not([hidden])").count() == 0, page=page.page)
 
 
+def test_dots_go_with_their_handles(scene_page: Callable[..., Any], table: Table, until: Callable[..., None]) -> None:
+    page = scene_page()
+    editor = table.edited_by(page)
+    dot = page.scene.locator(".ars-dot:not([hidden])")
+    show(page, editor, until, "/edit/handle/x+", tool="resize")
+    until(lambda: dot.count() == 6, page=page.page)
+    page.client.scene.reset()  # as viser's client does where its server went away
+    until(lambda: dot.count() == 0, page=page.page)
+
+
 def test_a_second_browser_sees_the_drag_while_it_lasts(
     scene_page: Callable[..., Any], table: Table, until: Callable[..., None]
 ) -> None:

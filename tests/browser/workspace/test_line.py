@@ -75,6 +75,8 @@ def test_a_line_that_is_closed_for_good_is_not_asked_for_again(open_flatly, boxe
         line.close(4410, "the session was deleted")
         expect(workspace.page.locator(".saved")).to_have_attribute("data-state", "lost")
         expect(workspace.page.get_by_role("alert")).to_contain_text("It can be brought back from the sessions page.")
+        workspace.page.keyboard.press("b")
+        expect(workspace.page.get_by_text("add the box once it is")).to_be_visible()
         workspace.page.evaluate("() => dispatchEvent(new Event('online'))")  # which asks for a lost line at once
         assert workspace.page.evaluate("() => new Promise((done) => setTimeout(() => done(true), 600))")
         assert line.opened == opened
