@@ -15,8 +15,8 @@ Boxes are not viser-clickable, so that a handle behind a box can be pressed: cli
 meets the boxes of `nodes.drawn()` with it.
 
 The nodes of box 7 are `/boxes/7` (nothing in it but visibility, for views to shadow), `/boxes/7/at` (its place;
-invisible while there is no such box) and in that `edges`, `body` and `name`. They are made once and never removed:
-viser remembers the removal of each name for ever.
+invisible while there is no such box) and in that `edges` and `body`. They are made once and never removed: viser
+remembers the removal of each name for ever. A box's own name is written by the bridge in the page, over the scene.
 """
 
 from collections.abc import Callable, Iterable
@@ -52,7 +52,6 @@ class _Nodes:
     at: viser.FrameHandle
     edges: viser.LineSegmentsHandle
     body: viser.BoxHandle
-    name: viser.LabelHandle
 
 
 class BoxNodes:
@@ -169,17 +168,15 @@ class BoxNodes:
         size = _scale(box)
         nodes = self._nodes.get(box_id)
         if nodes is None:
-            nodes = self._nodes[box_id] = self._make(box_id, color, size, stored.name)
+            nodes = self._nodes[box_id] = self._make(box_id, color, size)
         nodes.at.visible = True
         place(nodes.at, box.T_world_box)
         nodes.edges.scale = size
         nodes.edges.colors = np.array(color, dtype=np.uint8)
         nodes.body.scale = size
         nodes.body.color = color
-        nodes.name.text = stored.name
-        nodes.name.position = _top(box)
 
-    def _make(self, box_id: int, color: tuple[int, int, int], size: tuple[float, float, float], name: str) -> _Nodes:
+    def _make(self, box_id: int, color: tuple[int, int, int], size: tuple[float, float, float]) -> _Nodes:
         scene, at = self._server.scene, f"/boxes/{box_id}/at"
         scene.add_frame(f"/boxes/{box_id}", show_axes=False)
         return _Nodes(
@@ -197,7 +194,6 @@ class BoxNodes:
                 receive_shadow=False,
                 scale=size,
             ),
-            name=scene.add_label(f"{at}/name", name, anchor="bottom-center", depth_test=False),
         )
 
 
@@ -279,9 +275,3 @@ def _differs(a: VirtualBox | None, b: VirtualBox | None) -> bool:
 def _scale(box: Box) -> tuple[float, float, float]:
     x, y, z = (float(length) for length in box.size)
     return x, y, z
-
-
-def _top(box: Box) -> Float[np.ndarray, "3"]:
-    """Above the box's centre at the height of its highest corner, in the box's own frame."""
-    up_box = box.T_world_box[2, :3]
-    return up_box * float(np.abs(up_box * box.size).sum() / 2)

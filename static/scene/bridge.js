@@ -9,6 +9,7 @@
  *   {ars: "pointer", x, y, buttons}          CSS pixels in the iframe, while a button is down and once when it is not
  * What it hears, from the page around it alone:
  *   {ars: "view", mode: "scene" | "frame", blend, dark}         blend: 0 no photo, 1 the photo as it is
+ *   {ars: "names", boxes: [{id, name, color}]}                  written over the boxes; color: #rrggbb
  *   {ars: "fit"}                                                zoom 1, as a double-click does here
  *   {ars: "zoom", by}                                           times that about the middle
  *   {ars: "show", box}                                          zoom to the box of this id, and stay with it from frame
@@ -117,6 +118,7 @@
     if (told.ars === "fit") fit();
     if (told.ars === "zoom" && Number.isFinite(told.by) && told.by > 0) zoomAboutMiddle(told.by);
     if (told.ars === "show" && Number.isInteger(told.box) && view.mode === "frame") follows = { box: told.box, from: "" };
+    if (told.ars === "names" && Array.isArray(told.boxes)) nameBoxes(told.boxes);
     if (told.ars !== "view") return;
     if (told.mode === "scene" || told.mode === "frame") view.mode = told.mode;
     if (Number.isFinite(told.blend)) view.blend = Math.min(1, Math.max(0, told.blend));
@@ -170,6 +172,26 @@
   }
 
   /**
+   * Between which tangents, right of and below the direction of view, a box is seen; null: partly behind the camera.
+   * @param {Viser} viser @param {Node} edges the box's node of that name
+   */
+  function tangentsOf({ camera }, edges) {
+    let unit = edges; // what is scaled to the box's size is in it
+    edges.traverse((each) => void (each.material !== undefined && (unit = each)));
+    unit.updateWorldMatrix(true, false);
+    const [across, down] = [[], []].map(() => ({ least: Infinity, most: -Infinity }));
+    for (const x of [-0.5, 0.5]) for (const y of [-0.5, 0.5]) for (const z of [-0.5, 0.5]) {
+      const eye = camera.position.clone().set(x, y, z).applyMatrix4(unit.matrixWorld).applyMatrix4(camera.matrixWorldInverse);
+      if (eye.z >= 0) return null;
+      for (const [side, tangent] of /** @type {const} */ ([[across, -eye.x / eye.z], [down, eye.y / eye.z]])) {
+        side.least = Math.min(side.least, tangent);
+        side.most = Math.max(side.most, tangent);
+      }
+    }
+    return { across, down };
+  }
+
+  /**
    * Put the box that is stayed with in the middle, whenever the camera or the window is another than before: not while
    * the box itself is moved.
    * @param {Viser} viser
@@ -183,18 +205,9 @@
     const node = nodeRefFromName[edgesOf(follows.box)];
     if (from === follows.from || node == null || !isVisible(node)) return;
     follows.from = from;
-    let unit = node; // what is scaled to the box's size is in it
-    node.traverse((each) => void (each.material !== undefined && (unit = each)));
-    unit.updateWorldMatrix(true, false);
-    const [across, down] = [[], []].map(() => ({ least: Infinity, most: -Infinity }));
-    for (const x of [-0.5, 0.5]) for (const y of [-0.5, 0.5]) for (const z of [-0.5, 0.5]) {
-      const eye = camera.position.clone().set(x, y, z).applyMatrix4(unit.matrixWorld).applyMatrix4(camera.matrixWorldInverse);
-      if (eye.z >= 0) return; // partly behind the camera
-      for (const [side, tangent] of /** @type {const} */ ([[across, -eye.x / eye.z], [down, eye.y / eye.z]])) {
-        side.least = Math.min(side.least, tangent);
-        side.most = Math.max(side.most, tangent);
-      }
-    }
+    const sides = tangentsOf(viser, node);
+    if (sides === null) return;
+    const { across, down } = sides;
     const fitting = Math.min((half() * width) / height / (across.most - across.least), half() / (down.most - down.least));
     window2d.zoom = Math.min(LARGEST_ZOOM, Math.max(1, 2 * SHARE * fitting));
     window2d.x = (across.least + across.most) / 2;
@@ -406,6 +419,58 @@
     return dot;
   }
 
+  /** What is written over each box, by its id. @type {Map<number, HTMLElement>} */
+  const names = new Map();
+
+  /** @param {any[]} boxes */
+  function nameBoxes(boxes) {
+    const known = boxes.filter(({ id, name, color }) => Number.isInteger(id) && typeof name === "string" && /^#[0-9a-f]{6}$/i.test(color));
+    const gone = new Set(names.keys());
+    for (const { id, name, color } of known) {
+      gone.delete(id);
+      const chip = names.get(id) ?? document.createElement("div");
+      if (!names.has(id)) {
+        chip.className = "ars-name";
+        chip.hidden = true;
+        document.body.append(chip);
+        names.set(id, chip);
+      }
+      chip.textContent = name;
+      chip.style.background = color;
+      chip.style.color = isDark(color) ? "#ffffff" : "#0d1117";
+    }
+    for (const id of gone) {
+      names.get(id)?.remove();
+      names.delete(id);
+    }
+  }
+
+  /** Whether white is read better than black on a colour: its relative luminance of WCAG 2. @param {string} color */
+  function isDark(color) {
+    const [red, green, blue] = [1, 3, 5].map((at) => (parseInt(color.slice(at, at + 2), 16) / 255) ** 2.2);
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue < 0.179;
+  }
+
+  /** Put each name over the top of its box, within the canvas. @param {Viser} viser */
+  function placeNames(viser) {
+    const { camera, canvas, nodeRefFromName } = viser;
+    const { x: left, y: top, width, height } = canvas.getBoundingClientRect();
+    const pixels = height / (2 * Math.tan((camera.fov * Math.PI) / 360));
+    const shift = window2d.zoom === 1 ? { x: 0, y: 0 } : window2d;
+    if (names.size > 0) camera.updateWorldMatrix(true, false);
+    for (const [id, chip] of names) {
+      const edges = nodeRefFromName[edgesOf(id)];
+      const sides = edges == null || !isVisible(edges) ? null : tangentsOf(viser, edges);
+      const x = sides === null ? NaN : width / 2 + ((sides.across.least + sides.across.most) / 2 - shift.x) * pixels;
+      const [above, below] = sides === null ? [NaN, NaN] : [sides.down.least, sides.down.most].map((side) => height / 2 + (side - shift.y) * pixels);
+      const shown = x > 0 && x < width && below > 0 && above < height;
+      if (chip.hidden === shown) chip.hidden = !shown;
+      if (!shown) continue;
+      // Over a box that begins above the canvas the name stays in sight.
+      chip.style.transform = `translate(-50%, -100%) translate(${(left + x).toFixed(1)}px, ${(top + Math.max(24, above - 4)).toFixed(1)}px)`;
+    }
+  }
+
   const begun = performance.now();
   let announced = false;
   let complained = false;
@@ -426,6 +491,7 @@
     aim(viser);
     fade(viser);
     dress(viser);
+    placeNames(viser);
     if (pointer !== null) {
       tell({ ars: "pointer", ...pointer });
       pointer = null;

@@ -22,6 +22,7 @@ export function Stage({ view }) {
       if (told?.ars === "ready") {
         ready.value = true;
         tellBridge();
+        tellNames();
       } else if (told?.ars === "key" && told.type === "keydown") {
         press({ key: told.key, code: told.code, ctrlKey: told.ctrl, metaKey: told.meta, shiftKey: told.shift, altKey: told.alt, repeat: told.repeat });
       } else if (told?.ars === "zoom") store.zoom.value = told.zoom;
@@ -39,6 +40,15 @@ export function Stage({ view }) {
       location.origin,
     );
   useSignalEffect(tellBridge);
+  const tellNames = () => {
+    const boxes = [...store.boxes.value.values()].map(({ id, name, class_id }) => ({
+      id,
+      name,
+      color: store.classes.value.get(class_id)?.color,
+    }));
+    frame.current?.contentWindow?.postMessage({ ars: "names", boxes }, location.origin);
+  };
+  useSignalEffect(tellNames);
   useSignalEffect(() => {
     if (asked.value !== null) frame.current?.contentWindow?.postMessage(asked.value, location.origin);
   });
