@@ -79,7 +79,7 @@ function Overlays() {
     <div class="corner top-left">
       <div class="chip">
         <strong>Frame ${store.frame.value}</strong>
-        <span class="muted">of ${Math.max(0, store.frames.value - 1)}</span>
+        <span class="muted">of ${store.frames.value}</span>
         ${inFrame && html`<${FrameName} />`}
       </div>
       <${FrameSteps} />
