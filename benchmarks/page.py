@@ -234,27 +234,38 @@ def hear(page: Page) -> list[dict[str, Any]]:
     return heard
 
 
+def resting(scene: Frame, node: str, x: float) -> np.ndarray:
+    """Where a point of a node is on the canvas, CSS pixels, once it stays there."""
+    before = np.full(2, np.nan)
+    while not np.allclose(now := np.array(scene.evaluate(ON_SCREEN, [node, x])), before, atol=0.5):
+        before = now
+        scene.page.wait_for_timeout(400)
+    return now
+
+
 def measure_drag(mover: Page, watcher: Page, box_id: int) -> list[float]:
     """From a move of one person's mouse to the box's place in the other's scene."""
     mover.keyboard.press("g")
     ours, theirs = scene_of(mover), scene_of(watcher)
     ours.wait_for_function("() => window.__viserMutable.nodeRefFromName['/edit/gizmo']?.parent?.visible")
-    mover.wait_for_timeout(1500)
     stage = mover.locator(".stage iframe").bounding_box()
     assert stage is not None
     corner = np.array([stage["x"], stage["y"]])
-    centre, tip = (np.array(ours.evaluate(ON_SCREEN, ["/edit/gizmo", x])) + corner for x in (0.0, 0.05))
-    along = (tip - centre) / np.linalg.norm(tip - centre)
+    middle, tip = (resting(ours, "/edit/gizmo", x) + corner for x in (0.0, 0.05))
+    along = (tip - middle) / np.linalg.norm(tip - middle)
     ours.evaluate(WATCH_MOUSE)
     theirs.evaluate(WATCH_NODE, f"/boxes/{box_id}/at")
-    mover.mouse.move(*(centre + along * GRIP))
+    mover.mouse.move(*(middle + along * GRIP))
     mover.wait_for_timeout(500)
     mover.mouse.down()
+    mover.mouse.move(*(middle + along * (GRIP + 1)))
+    mover.locator(".readout").wait_for()
+    mover.wait_for_timeout(500)
     found: list[float] = []
     for i in range(MOVES):
         theirs.evaluate("() => (window.seen.length = 0)")
         ours.evaluate("() => (window.moved.length = 0)")
-        mover.mouse.move(*(centre + along * (GRIP + 2 * (i + 1))))
+        mover.mouse.move(*(middle + along * (GRIP + 3 + 2 * i)))
         seen = theirs.wait_for_function("() => window.seen[0]", timeout=20_000).json_value()
         found.append(seen - ours.evaluate("() => window.moved[0]"))
         mover.wait_for_timeout(60)
@@ -307,7 +318,9 @@ def measure(playwright: Playwright, executable: str | None, base: str, ids: dict
             row(f"enter a frame, {what}", milliseconds(whole, high="max"))
             row("  of which the server", milliseconds(server_part, high="max"))
             page.context.close()
-        mover, watcher = (context_of(browser, base).new_page() for _ in range(2))
+    # Two people have two computers: one Chromium would draw both scenes in one process, one after the other.
+    with chromium(playwright, executable) as one, chromium(playwright, executable) as other:
+        mover, watcher = (context_of(browser, base).new_page() for browser in (one, other))
         for page in (watcher, mover):
             opened(page, f"{base}/sessions/{ids['demo']}#box={box_id}&frame=0")
         mover.evaluate(ENTER, frame)
