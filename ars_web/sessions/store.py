@@ -41,6 +41,8 @@ class _Open:
     # Replaced as a whole, never changed in place, so that threads need no lock to read them.
     state: SessionState | None = None
     frames: FrameTable | None = None
+    # Long recordings take a while to read, and a page that opens asks for a dozen images at once.
+    frames_lock: threading.Lock = field(default_factory=threading.Lock)
     cameras: dict[int, Camera] | None = field(default=None)
 
 
@@ -304,7 +306,9 @@ class SessionStore:
 
     def _frames(self, sid: str, connection: Connection, session: _Open) -> FrameTable:
         if session.frames is None:
-            session.frames = rows.load_frames(connection, self.folder / sid)
+            with session.frames_lock:
+                if session.frames is None:
+                    session.frames = rows.load_frames(connection, self.folder / sid)
         return session.frames
 
 

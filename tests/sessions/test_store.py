@@ -7,6 +7,7 @@ import sys
 import textwrap
 import threading
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +50,19 @@ def test_a_session_holds_the_recording_as_it_was(store: SessionStore, make_recor
     assert [(b.id, b.class_id, b.name) for b in snapshot.state.boxes.values()] == [(1, 1, "ball"), (2, 1, "ball 2")]
     assert np.array_equal(snapshot.state.boxes[2].box.T_world_box, a_box(1.0).T_world_box)
     assert (snapshot.state.next_class_id, snapshot.state.next_box_id) == (3, 3)
+
+
+def test_frames_that_many_want_at_once_are_read_once(store: SessionStore, make_recording: MakeRecording):
+    sid = store.create(make_recording(3000), name="s").id
+    start = threading.Barrier(8)
+
+    def read(_: int):
+        start.wait()
+        return store.frames(sid)
+
+    with ThreadPoolExecutor(8) as threads:
+        first, *others = threads.map(read, range(8))
+    assert all(frames is first for frames in others)
 
 
 def test_frames_cannot_be_written_to(store: SessionStore, sid: str):
