@@ -270,6 +270,7 @@ def measure_drag(mover: Page, watcher: Page, box_id: int) -> list[float]:
         found.append(seen - ours.evaluate("() => window.moved[0]"))
         mover.wait_for_timeout(60)
     mover.mouse.up()
+    mover.locator(".readout").wait_for(state="detached")  # it is stored
     return found
 
 
