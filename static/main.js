@@ -51,6 +51,7 @@ Object.assign(
       if (store.mode.value !== "scene") store.mode.value = "scene";
       line.send({ type: "look", at });
     },
+    introduce: line.introduce,
     select: (id) => (store.selected.value = id),
     tellingFrames: (id) => api.tellingFrames(sid(), id),
     labelsOf: (boxes, frames) => api.labelsOf(sid(), boxes, frames),

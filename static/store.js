@@ -160,6 +160,7 @@ export function setProblem(place, text) {
  * @property {(index?: number) => void} enterFrame
  * @property {() => void} leaveFrame
  * @property {(at: "all" | "selected" | "frame") => void} look
+ * @property {(name: string) => void} introduce the name by which others see this person
  * @property {(id: number | null) => void} select
  * @property {(id: number) => Promise<Schemas["TellingFrameJson"][]>} tellingFrames
  * @property {(boxes: {T_world_box: Transform, size: [number, number, number]}[], frames: number[]) => Promise<Schemas["FramePreviewJson"][]>} labelsOf

@@ -242,6 +242,17 @@ export const commands = [
     keys: ["Y"],
     run: () => (store.sidePanel.value = store.sidePanel.value === "history" ? "boxes" : "history"),
   },
+  {
+    id: "introduce",
+    title: "Your name, as others here see it",
+    group: "Session",
+    keys: [],
+    run: () => {
+      const mine = store.people.value.find((person) => person.own)?.name ?? "";
+      const name = window.prompt("Your name, as others at this session see it", mine);
+      if (name !== null) actions.introduce(name.trim());
+    },
+  },
   { id: "palette", title: "All commands", group: "Session", keys: ["Ctrl+K"], run: () => (store.overlay.value = "palette") },
   { id: "help", title: "Keys", group: "Session", keys: ["?"], run: () => (store.overlay.value = "help") },
   { id: "back", title: "Back out one step", group: "Session", keys: ["Escape"], run: backOut },
