@@ -109,8 +109,6 @@
     return parts && PARTS.every((part) => parts[part] != null) ? parts : null;
   }
 
-  // ---------------------------------------------------------------- what the page wants
-
   addEventListener("message", (event) => {
     if (event.origin !== location.origin || event.source !== window.parent || window.parent === window) return;
     const told = event.data;
@@ -130,8 +128,6 @@
   // viser tries to reach it again only while its own page has the focus, which mostly the page around it has.
   document.hasFocus = () => !document.hidden;
   document.addEventListener("visibilitychange", () => dispatchEvent(new Event(document.hidden ? "blur" : "focus")));
-
-  // ---------------------------------------------------------------- keys
 
   /** What a browser does with these keys is not wanted: scroll, find, save, bookmark. */
   const OURS_WITH_CONTROL = new Set(["z", "y", "k", "d", "s", "home", "end"]);
@@ -153,8 +149,6 @@
   addEventListener("keydown", hearKey, true);
   addEventListener("keyup", hearKey, true);
   addEventListener("blur", () => (space = false));
-
-  // ---------------------------------------------------------------- zoom and pan
 
   const half = () => Math.tan((fov.base * Math.PI) / 360);
 
@@ -315,8 +309,6 @@
   addEventListener("contextmenu", (event) => view.mode === "frame" && event.preventDefault(), true);
   addEventListener("dblclick", () => view.mode === "frame" && fit(), true);
 
-  // ---------------------------------------------------------------- each frame of the screen
-
   /** @param {Viser} viser */
   function lock(viser) {
     const controls = viser.cameraControl;
@@ -411,12 +403,18 @@
 
   /** @param {string} name */
   function addDot(name) {
-    const dot = document.createElement("div");
-    dot.className = "ars-dot";
-    dot.hidden = true;
-    document.body.append(dot);
+    const dot = addOver("ars-dot");
     dots.set(name, dot);
     return dot;
+  }
+
+  /** Something that lies over the canvas, hidden at first. @param {string} kind */
+  function addOver(kind) {
+    const over = document.createElement("div");
+    over.className = kind;
+    over.hidden = true;
+    document.body.append(over);
+    return over;
   }
 
   /** What is written over each box, by its id. @type {Map<number, HTMLElement>} */
@@ -428,13 +426,8 @@
     const gone = new Set(names.keys());
     for (const { id, name, color } of known) {
       gone.delete(id);
-      const chip = names.get(id) ?? document.createElement("div");
-      if (!names.has(id)) {
-        chip.className = "ars-name";
-        chip.hidden = true;
-        document.body.append(chip);
-        names.set(id, chip);
-      }
+      const chip = names.get(id) ?? addOver("ars-name");
+      names.set(id, chip);
       chip.textContent = name;
       chip.style.background = color;
       chip.style.color = isDark(color) ? "#ffffff" : "#0d1117";
