@@ -403,17 +403,17 @@
 
   /** @param {string} name */
   function addDot(name) {
-    const dot = addOver("ars-dot");
+    const dot = hiddenOver("ars-dot");
+    document.body.append(dot);
     dots.set(name, dot);
     return dot;
   }
 
-  /** Something that lies over the canvas, hidden at first. @param {string} kind */
-  function addOver(kind) {
+  /** Something that is to lie over the canvas, hidden at first. @param {string} kind */
+  function hiddenOver(kind) {
     const over = document.createElement("div");
     over.className = kind;
     over.hidden = true;
-    document.body.append(over);
     return over;
   }
 
@@ -426,7 +426,7 @@
     const gone = new Set(names.keys());
     for (const { id, name, color } of known) {
       gone.delete(id);
-      const chip = names.get(id) ?? addOver("ars-name");
+      const chip = names.get(id) ?? hiddenOver("ars-name");
       names.set(id, chip);
       chip.textContent = name;
       chip.style.background = color;
@@ -459,6 +459,7 @@
       const shown = x > 0 && x < width && below > 0 && above < height;
       if (chip.hidden === shown) chip.hidden = !shown;
       if (!shown) continue;
+      if (!chip.isConnected) document.body.append(chip); // names may be told before the page has a body
       // Over a box that begins above the canvas the name stays in sight.
       chip.style.transform = `translate(-50%, -100%) translate(${(left + x).toFixed(1)}px, ${(top + Math.max(24, above - 4)).toFixed(1)}px)`;
     }

@@ -83,7 +83,9 @@ def test_another_windows_shape_gets_another_field_of_view(scenes: SceneServers, 
 def test_leaving_puts_the_free_camera_back(
     scenes: SceneServers, sid: str, visitor: Any, told: list[ViewEvent], until: Callable[..., None]
 ) -> None:
-    scenes.show(sid, VIEW, ViewState(mode="scene", frame=2))  # a page that begins in a frame leaves to the overview
+    scenes.show(sid, VIEW, ViewState(mode="scene", frame=2))
+    # A page that begins in a frame leaves to the overview: let it see the scene first.
+    visitor.listen_until(lambda v: "/current/photo" in v.nodes)
     scenes.show(sid, VIEW, ViewState(mode="frame", frame=2))
     until(lambda: len(told) == 1)
     scenes.show(sid, VIEW, ViewState(mode="frame", frame=7))  # distorted

@@ -3,11 +3,13 @@
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import cv2
 import numpy as np
 import pytest
 import viser
+from playwright.sync_api import Browser, Route
 
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box
@@ -18,6 +20,8 @@ from ars_web.scene.frame_view import FrameView
 from ars_web.scene.photos import Photos
 from ars_web.sessions.model import FrameTable, ObjectClass, SessionState, VirtualBox
 from ars_web.workspace import Entered
+
+STATIC = Path(__file__).parents[3] / "static"
 
 LENS = Lens(fov=0.9, near=0.01, far=1000.0)
 
@@ -257,3 +261,34 @@ def test_the_canvas_has_the_pages_colours_and_nothing_of_visers_is_over_it(in_fr
         return [[width, height], places.filter(([x, y]) => document.elementFromPoint(x, y) !== canvas)];
     }"""
     assert in_frame.scene.evaluate(covered) == [[1000, 700], []]
+
+
+def test_names_told_before_the_page_has_a_body_are_kept(browser: Browser) -> None:
+    """viser's page is 2 MB: the page round it may speak while it is still being read."""
+    context = browser.new_context()
+    page = context.new_page()
+    complaints: list[str] = []
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    telling = """<!doctype html><html><head><script src="/bridge.js"></script><script>
+        dispatchEvent(new MessageEvent("message", { origin: location.origin, source: window.parent,
+            data: { ars: "names", boxes: [{ id: 1, name: "cube", color: "#56b4e9" }] } }));
+        window.told = document.body === null;
+    </script></head><body></body></html>"""
+    bridge = (STATIC / "scene" / "bridge.js").read_text(encoding="utf-8")
+    answers = {
+        "/": ("<iframe src='/scene'></iframe>", "text/html"),
+        "/scene": (telling, "text/html"),
+        "/bridge.js": (bridge, "text/javascript"),
+    }
+
+    def answer(route: Route) -> None:
+        body, kind = answers[urlsplit(route.request.url).path]
+        route.fulfill(body=body, content_type=kind)
+
+    context.route("http://ars.invalid/**", answer)
+    page.goto("http://ars.invalid/")
+    frame = page.frames[1]
+    frame.wait_for_function("window.told !== undefined")
+    assert frame.evaluate("window.told") is True
+    assert complaints == []
+    context.close()
