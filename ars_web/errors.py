@@ -2,7 +2,8 @@
 
 ArsError                  the root; its message names the value, what is wrong with it and what to do
 ├── BadInput              a value, a file or a request that cannot be used as it is
-│   └── BadFile           the same, in a file: the message begins with `FILE:LINE:` or `FILE:`
+│   ├── BadFile           the same, in a file: the message begins with `FILE:LINE:` or `FILE:`
+│   └── ViewsDisagree     outlines in several views that no one object can have
 ├── NotFound              a session, a frame, a box, a class or an export that is not there
 ├── Conflict              the thing was changed meanwhile; `current` holds what it is now
 ├── Locked                the thing is kept as it is until someone unlocks it
@@ -45,6 +46,22 @@ class BadFile(BadInput):
 
 def _bad_file(path: Path, message: str, line: int | None) -> BadFile:
     return BadFile(path, message, line=line)
+
+
+class ViewsDisagree(BadInput):
+    """Outlines in several views that no one object can have, or that are too much alike to tell where it is.
+
+    Attributes:
+        misfits: (frame, pixels) of the views concerned, the worst first: by how much each outline would have to grow
+            to meet the others; NaN where no growing helps, such as for an object behind a camera.
+    """
+
+    def __init__(self, message: str, misfits: tuple[tuple[int, float], ...]) -> None:
+        super().__init__(message)
+        self.misfits = misfits
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return ViewsDisagree, (str(self), self.misfits)
 
 
 class NotFound(ArsError):
