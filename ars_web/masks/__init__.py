@@ -1,0 +1,1 @@
+"""Outlines of objects in photographs: found by a segmenter, carried to further frames, made into boxes."""
