@@ -1,6 +1,5 @@
 """Boxes and classes as the JSON of the API and of box files."""
 
-import json
 import math
 from pathlib import Path
 from typing import Annotated, Any
@@ -8,13 +7,14 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, field_validator
 
-from ars_web.errors import BadFile, BadInput
+from ars_web.errors import BadFile
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import LARGEST_SIZE, Box
 from ars_web.geometry.rigid_transform import Transform
 from ars_web.sessions.drafting import BoxDraft
 from ars_web.sessions.model import ObjectClass, VirtualBox
 from ars_web.sessions.names import LONGEST_NAME
+from ars_web.sessions.strict_json import first_fault, place_text, strict_json
 
 # Strict: a truth value or a string is no number. Whole numbers are. Beyond a million kilometres it is no place.
 Coordinate = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-1e9, le=1e9)]
@@ -126,40 +126,17 @@ def read_boxes_file(path: Path) -> list[BoxDraft]:
         BadFile: it cannot be read or is not such a list; the message says which box and which of its values.
     """
     try:
-        text = path.read_bytes().decode("utf-8-sig")
-        # Not orjson: of a name given twice in one object it would silently take one.
-        items = json.loads(text, object_pairs_hook=_without_repeats)
-        boxes = _BOX_FILE.validate_python(items)
+        boxes = _BOX_FILE.validate_python(strict_json(path.read_bytes(), path))
     except OSError as error:
         raise BadFile(path, f"cannot be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise BadFile(path, f"is not text in UTF-8 (byte {error.start})") from error
-    except json.JSONDecodeError as error:
-        raise BadFile(path, f"is not JSON: {error.msg}", line=error.lineno) from error
     except ValidationError as error:
         raise BadFile(path, _first_fault(error)) from error
-    except (BadInput, RecursionError) as error:
-        raise BadFile(path, f"is not a list of boxes: {error}") from error
     return [box.draft for box in boxes]
-
-
-def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    found = dict(pairs)
-    if len(found) != len(pairs):
-        twice = next(key for key, _ in pairs if sum(key == other for other, _ in pairs) > 1)
-        raise BadInput(f"{twice!r} is given twice in one object")
-    return found
 
 
 def _first_fault(error: ValidationError) -> str:
     """Where in the list the first fault is, and what it is."""
-    faults = error.errors(include_url=False)
-    fault = faults[0]
-    place = list(fault["loc"])
+    place, message = first_fault(error)
     if not place:
         return "must hold a list of boxes, as `ars-web boxes export` writes it"
-    where = f"box {place[0]}" + "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in place[1:])
-    more = f" (and {len(faults) - 1} more faults)" if len(faults) > 1 else ""
-    message = fault["msg"].removeprefix("Value error, ")
-    given = "" if fault["type"] == "missing" else f", not {str(fault['input'])[:60]}"
-    return f"{where}: {message}{given}{more}; boxes are counted from 0"
+    return f"box {place[0]}{place_text(place[1:])}: {message}; boxes are counted from 0"

@@ -91,7 +91,7 @@ def placed(**values: object) -> str:
         ("[\n{]", "boxes.json:2: is not JSON"),
         ("{}", "must hold a list of boxes"),
         ("[[]]", "box 0: "),
-        ("[" * 100_000, "is not a list of boxes"),
+        ("[" * 100_000, "is nested too deeply"),
         (changed(size=[1, 1]), r"box 1\.size\[2\]: Field required"),
         (changed(size=[1, 0, 1]), r"box 1\.size\[1\]: .* greater than 0, not 0"),
         (changed(size=[1, -1, 1]), r"box 1\.size\[1\]: .* greater than 0"),
