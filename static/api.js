@@ -2,6 +2,8 @@
 
 /** @typedef {import("./store.js").Schemas} Schemas */
 /** @typedef {import("./store.js").Box} Box */
+/** @typedef {import("./store.js").Mask} Mask */
+/** @typedef {import("./store.js").Polygon} Polygon */
 
 /** What went wrong, in the server's words: they are written to be shown. */
 export class ApiError extends Error {
@@ -10,12 +12,14 @@ export class ApiError extends Error {
    * @param {number} status the HTTP status; 0: the server did not answer
    * @param {unknown} [current] of a conflict: the thing as it is now
    * @param {readonly Schemas["FieldProblem"][]} [errors] of a request that does not fit: which parts of it, and why
+   * @param {readonly {frame: number, misfit_px: number | null}[]} [views] of outlines that no one object can have: which
    */
-  constructor(message, status, current = undefined, errors = []) {
+  constructor(message, status, current = undefined, errors = [], views = []) {
     super(message);
     this.status = status;
     this.current = current;
     this.errors = errors;
+    this.views = views;
   }
 }
 
@@ -198,6 +202,52 @@ export async function imageProblem(sid, index) {
   }
 }
 
+// Masks, and the hulls that they give.
+
+/** @param {string} sid @returns {Promise<Mask[]>} */
+export const masks = (sid) => request("GET", under(sid, "/masks"));
+
+/**
+ * @param {string} sid
+ * @param {{box_id: number | null, class_id: number, frame: number, polygons: readonly Polygon[], origin: string}} mask
+ * @returns {Promise<Mask>}
+ */
+export const addMask = (sid, mask) => request("POST", under(sid, "/masks"), { body: mask, key: true });
+
+/**
+ * @param {string} sid @param {number} id @param {number} revision
+ * @param {{polygons?: readonly Polygon[], origin?: string, accepted?: boolean}} changes
+ * @returns {Promise<Mask>}
+ */
+export const changeMask = (sid, id, revision, changes) => request("PUT", under(sid, `/masks/${id}`), { revision, body: changes });
+
+/** @param {string} sid @param {number} id @param {number} revision @returns {Promise<void>} */
+export const deleteMask = (sid, id, revision) => request("DELETE", under(sid, `/masks/${id}`), { revision });
+
+/** @param {string} sid @param {number} id @param {number | undefined} revision undefined: there is no box yet @param {object} options @returns {Promise<Box>} */
+export const makeHull = (sid, id, revision, options) => request("PUT", under(sid, `/boxes/${id}/hull`), { revision, body: options });
+
+/** @param {string} sid @param {object} wish @returns {Promise<import("./store.js").HullPreview>} */
+export const previewHull = (sid, wish) => request("POST", under(sid, "/hull-preview"), { body: wish });
+
+/** @param {string} sid @param {object} change @returns {Promise<{polygons: Polygon[]}>} */
+export const combine = (sid, change) => request("POST", under(sid, "/polygons/combine"), { body: change });
+
+/** @param {string} sid @param {number} frame @param {object} prompt @returns {Promise<{polygons: Polygon[], seconds: number}>} */
+export const segment = (sid, frame, prompt) => request("POST", under(sid, `/frames/${frame}/segment`), { body: prompt });
+
+/** @param {string} sid @param {number} id @returns {Promise<import("./store.js").OutlineJob>} */
+export const outlineRest = (sid, id) => request("POST", under(sid, `/boxes/${id}/outline-rest`), { body: {}, key: true });
+
+/** @param {string} sid @param {string} id @returns {Promise<import("./store.js").OutlineJob>} */
+export const outlineState = (sid, id) => request("GET", under(sid, `/outline-jobs/${encodeURIComponent(id)}`));
+
+/** @param {string} sid @param {string} id @returns {Promise<import("./store.js").OutlineJob>} */
+export const cancelOutline = (sid, id) => request("POST", under(sid, `/outline-jobs/${encodeURIComponent(id)}/cancel`));
+
+/** @param {string} sid @param {number} id @param {number} revision @param {object} wish @returns {Promise<import("./store.js").Refinement>} */
+export const refineBox = (sid, id, revision, wish) => request("POST", under(sid, `/boxes/${id}/refine`), { revision, body: wish });
+
 // Exports.
 
 /** @returns {Promise<Schemas["FormatsJson"]>} */
@@ -297,7 +347,7 @@ async function request(method, address, { body, revision, key, signal, parsed = 
 
 /** @param {number} status @param {any} problem */
 function failure(status, problem) {
-  return new ApiError(problem?.detail ?? `The server answered ${status}.`, status, problem?.current, problem?.errors);
+  return new ApiError(problem?.detail ?? `The server answered ${status}.`, status, problem?.current, problem?.errors, problem?.views);
 }
 
 /** 32 hex digits; not crypto.randomUUID, which plain http on a lab's network does not have. */

@@ -43,7 +43,7 @@ export function connect(send) {
  * @param {() => Promise<T>} work
  * @returns {Promise<T>}
  */
-function inTurn(what, work) {
+export function inTurn(what, work) {
   store.unsaved.value += 1;
   const before = queues.get(what) ?? Promise.resolve();
   const done = before.then(work, work).finally(() => (store.unsaved.value -= 1));

@@ -6,6 +6,7 @@ import * as editing from "./editing.js";
 import { followTheme } from "./lib/theme.js";
 import { effect, h, render } from "./lib/view.js";
 import * as line from "./line.js";
+import * as maskEditing from "./mask_editing.js";
 import * as store from "./store.js";
 
 const PAGE = /** @type {HTMLElement} */ (document.getElementById("page"));
@@ -31,6 +32,17 @@ Object.assign(
     boxFromPoints: editing.boxFromPoints,
     locatePoint: (observations) => api.locatePoint(sid(), observations),
     epipolar: async (of, frame) => (await api.epipolar(sid(), of, frame)).lines,
+    putMask: maskEditing.putMask,
+    acceptMask: maskEditing.acceptMask,
+    deleteMask: maskEditing.deleteMask,
+    makeHull: maskEditing.makeHull,
+    previewHull: (views, options, show_in) => api.previewHull(sid(), { views, ...options, show_in }),
+    combine: async (change) => (await api.combine(sid(), change)).polygons,
+    segment: async (frame, prompt) => (await api.segment(sid(), frame, prompt)).polygons,
+    outlineRest: (id) => api.outlineRest(sid(), id),
+    outlineState: (id) => api.outlineState(sid(), id),
+    cancelOutline: (id) => api.cancelOutline(sid(), id),
+    refineBox: maskEditing.refineBox,
     addClass: editing.addClass,
     changeClass: editing.changeClass,
     deleteClass: editing.deleteClass,
@@ -155,7 +167,7 @@ function keepView() {
   const parts = new URLSearchParams();
   parts.set("frame", String(store.frame.value));
   if (store.mode.value !== "scene") parts.set("mode", store.mode.value);
-  if (store.selected.value !== null) parts.set("box", String(store.selected.value));
+  if (store.selected.value !== null && store.selected.value !== store.NEW) parts.set("box", String(store.selected.value));
   clearTimeout(keeping);
   // Browsers refuse hundreds of these a minute, which scrubbing would be.
   keeping = setTimeout(() => history.replaceState(null, "", `#${parts}`), 300);
@@ -168,8 +180,8 @@ function restoreView() {
   const mode = parts.get("mode");
   const box = Number(parts.get("box") ?? NaN);
   goTo(Number(parts.get("frame") ?? Math.floor(store.frames.value / 2)) || 0);
-  if (mode === "frame" || mode === "export") store.mode.value = mode;
-  if (store.boxes.value.has(box)) store.selected.value = box;
+  if (mode === "frame" || mode === "masks" || mode === "export") store.mode.value = mode;
+  if (store.isObject(box)) store.selected.value = box;
 }
 
 async function openSessions() {

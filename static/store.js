@@ -14,6 +14,45 @@ import { computed, signal } from "./lib/view.js";
 /** @typedef {Schemas["CameraJson"]} Camera */
 /** @typedef {Schemas["ExportJson"]} Export */
 /** @typedef {{position: [number, number, number], wxyz: [number, number, number, number]}} Transform */
+/** @typedef {[number, number]} Corner in image coordinates of the original image */
+/** @typedef {{outer: Corner[], holes: Corner[][]}} Polygon */
+/** @typedef {"drawn" | "smart" | "proposed"} MaskOrigin */
+
+/**
+ * An object's outline in one frame. Its box may not be made yet; `accepted` false: it waits for a yes or a no.
+ * @typedef {{id: number, box_id: number, class_id: number, frame: number, polygons: Polygon[], origin: MaskOrigin, accepted: boolean, revision: number}} Mask
+ */
+
+/** How a hull is made of masks: lengths in metres, `widen_px` by how much each mask is widened. @typedef {{orientation: "world" | "upright" | "free", widen_px: number, ground: number | null}} HullOptions */
+/** @typedef {{frame: number, polygons: readonly Polygon[]}} MaskView */
+/** What an object looks like in one frame, as far as a person has said. @typedef {{rectangle?: [number, number, number, number], inside?: Corner[][], outside?: Corner[][], brush_width?: number, start?: Polygon[]}} SegmentPrompt */
+
+/**
+ * What outlines give, before anything of it is stored; metres.
+ * @typedef {object} HullPreview
+ * @property {{volume: number, size: [number, number, number], centre_of_mass: [number, number, number], box: {T_world_box: Transform, size: [number, number, number]}} | null} hull
+ * @property {number | null} angle_degrees between the two views that are farthest apart
+ * @property {{frame: number, polygons: Polygon[], kind: "band" | "hull"}[]} overlays
+ * @property {{detail: string, views: {frame: number, misfit_px: number | null}[]} | null} problem
+ * @property {string[]} warnings
+ * @property {{frame: number, degrees: number, reason: string} | null} next_view
+ */
+
+/**
+ * Masks being made by the server in further frames.
+ * @typedef {object} OutlineJob
+ * @property {string} id
+ * @property {"queued" | "running" | "done" | "failed" | "cancelled"} state
+ * @property {number} done
+ * @property {number} total
+ * @property {number | null} seconds_left
+ * @property {number[]} accepted frames
+ * @property {number[]} doubtful frames whose masks wait for a yes or a no
+ * @property {{frame: number, reason: string}[]} dropped
+ * @property {string | null} error
+ */
+
+/** How well a box fits what was drawn; pixels. @typedef {{box: Box, residuals: {frame: number, px: number[], rms_px: number, outlier: boolean}[], rms_px: number, moved_mm: number, warnings: string[]}} Refinement */
 
 /**
  * A box's place and size while it is dragged or typed; nothing of it is stored yet.
@@ -28,7 +67,7 @@ import { computed, signal } from "./lib/view.js";
  * @typedef {{root?: string, upload?: string, path: string, format: string, images?: string, camera?: string}} Source
  */
 
-/** @typedef {"scene" | "frame" | "export"} Mode */
+/** @typedef {"scene" | "frame" | "masks" | "export"} Mode */
 /** @typedef {"select" | "move" | "rotate" | "resize" | "points"} Tool */
 
 /**
@@ -50,6 +89,8 @@ export const sid = signal("");
 export const session = signal(/** @type {Session | null} */ (null));
 export const boxes = signal(/** @type {ReadonlyMap<number, Box>} */ (new Map()));
 export const classes = signal(/** @type {ReadonlyMap<number, ObjectClass>} */ (new Map()));
+/** The outlines of objects in frames, by their ids. */
+export const masks = signal(/** @type {ReadonlyMap<number, Mask>} */ (new Map()));
 /** The newest revision that this page has been told of. */
 export const revision = signal(0);
 /** The newest edit that came over the line, anybody's. */
@@ -111,6 +152,33 @@ export const selectedBox = computed(() =>
   selected.value === null ? null : (shownBoxes.value.get(selected.value) ?? null),
 );
 
+/**
+ * An object that has masks and no box yet; `id` is the one that its box will have.
+ * @typedef {{id: number, class_id: number}} Draft
+ */
+
+/** The selected object while nothing of it is stored: no mask, and so no id. */
+export const NEW = 0;
+/** The class of the new object that is being drawn; null: none is. */
+export const newClass = signal(/** @type {number | null} */ (null));
+/** Objects without a box, in the order of their ids. */
+export const drafts = computed(() => {
+  /** @type {Map<number, Draft>} */
+  const found = new Map();
+  for (const { box_id, class_id } of masks.value.values()) {
+    if (!boxes.value.has(box_id)) found.set(box_id, { id: box_id, class_id });
+  }
+  return [...found.values()].sort((a, b) => a.id - b.id);
+});
+/** Whether an id may be selected: of a box, of an object that has masks, or of a new one. @param {number} id */
+export function isObject(id) {
+  return boxes.value.has(id) || drafts.value.some((draft) => draft.id === id) || (id === NEW && newClass.value !== null);
+}
+/** Of the selected object, by frame. */
+export const masksOfSelected = computed(() =>
+  [...masks.value.values()].filter(({ box_id }) => box_id === selected.value).sort((a, b) => a.frame - b.frame),
+);
+
 /** The class that a new box gets: the one chosen last, else that of the selected box, else the first; null: there is none. */
 export const classOfNew = computed(() => {
   const known = [chosenClass.value, selectedBox.value?.class_id].find((id) => classes.value.has(id ?? -1));
@@ -147,6 +215,21 @@ export function setProblem(place, text) {
  * @property {(observations: {frame: number, x: number, y: number}[]) => Promise<Schemas["PointAnswer"]>} locatePoint
  * @property {(of: {frame: number, x: number, y: number}, frame: number) => Promise<[number, number][][]>} epipolar
  *   where a point seen in one frame may be in another: polylines in image coordinates
+ * @property {(of: {box_id: number | null, class_id: number}, frame: number, polygons: readonly Polygon[], origin: MaskOrigin) => Promise<Mask>} putMask
+ *   store an outline, new or in the place of the one that is there; the box and hull that are made of it follow.
+ *   `box_id` null: of a new object, whose id the answer tells
+ * @property {(id: number) => Promise<void>} acceptMask the yes to a proposed one
+ * @property {(id: number) => Promise<void>} deleteMask
+ * @property {(id: number, options: Partial<HullOptions> & {class_id?: number, name?: string}) => Promise<void>} makeHull
+ *   make or remake a box of its stored masks
+ * @property {(views: readonly MaskView[], options: HullOptions, show_in: readonly number[]) => Promise<HullPreview>} previewHull
+ * @property {(change: {frame: number, polygons: readonly Polygon[], operation: "add" | "subtract", polygon?: Polygon, stroke?: {points: Corner[], width: number}}) => Promise<Polygon[]>} combine
+ *   outlines with a shape or a brush's stroke added or taken away
+ * @property {(frame: number, prompt: SegmentPrompt) => Promise<Polygon[]>} segment
+ * @property {(id: number) => Promise<OutlineJob>} outlineRest
+ * @property {(id: string) => Promise<OutlineJob>} outlineState
+ * @property {(id: string) => Promise<OutlineJob>} cancelOutline
+ * @property {(id: number, orientation: "upright" | "free") => Promise<Refinement>} refineBox move a box to where it fits its masks best
  * @property {(name: string) => Promise<ObjectClass>} addClass
  * @property {(id: number, changes: {name?: string, color?: string, default_size?: [number, number, number] | null}) => Promise<void>} changeClass
  * @property {(id: number) => Promise<void>} deleteClass
