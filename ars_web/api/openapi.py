@@ -11,7 +11,7 @@ from pydantic.json_schema import models_json_schema
 from ars_web.api.dependencies import JsonResponse
 from ars_web.api.live_models import LiveFromPage, LiveToPage
 from ars_web.api.models import EditJson
-from ars_web.api.problems import DESCRIPTIONS
+from ars_web.api.problems import DESCRIPTIONS, ViewsProblem
 from ars_web.api.security import OPEN_PATHS
 
 _DESCRIPTION = (
@@ -35,7 +35,12 @@ def document(app: FastAPI) -> dict[str, Any]:
     if app.openapi_schema is None:
         schema = get_openapi(title=app.title, version=app.version, description=_DESCRIPTION, routes=app.routes)
         components = cast(dict[str, Any], schema.setdefault("components", {}))
-        answers: list[type[BaseModel]] = [*{model for model, _ in DESCRIPTIONS.values()}, EditJson, LiveToPage]
+        answers: list[type[BaseModel]] = [
+            *{model for model, _ in DESCRIPTIONS.values()},
+            ViewsProblem,
+            EditJson,
+            LiveToPage,
+        ]
         _, found = models_json_schema(
             [(LiveFromPage, "validation"), *((model, "serialization") for model in answers)],
             ref_template="#/components/schemas/{model}",

@@ -1,6 +1,7 @@
 """Errors as RFC 9457 problem documents: one table for all of them."""
 
 import logging
+import math
 import secrets
 from collections.abc import Mapping, Sequence
 from http import HTTPStatus
@@ -27,6 +28,7 @@ from ars_web.errors import (
     RefusedPath,
     StoreError,
     TooLarge,
+    ViewsDisagree,
 )
 from ars_web.sessions.editing import NothingToUndo
 
@@ -37,6 +39,7 @@ MEDIA_TYPE = "application/problem+json"
 STATUS: dict[type[ArsError], tuple[int, str, str]] = {
     BadFile: (422, "bad-file", "A file cannot be used"),
     BadInput: (422, "bad-input", "The request cannot be used"),
+    ViewsDisagree: (422, "views-disagree", "The outlines do not fit one object"),
     NotFound: (404, "not-found", "Not found"),
     NothingToUndo: (409, "nothing-to-undo", "Nothing to undo or redo"),
     Conflict: (409, "conflict", "It was changed meanwhile"),
@@ -73,6 +76,21 @@ class ValidationProblem(Problem):
     errors: list[FieldProblem] = Field(default_factory=list[FieldProblem])
 
 
+class ViewMisfit(BaseModel):
+    """One of the views that do not fit together."""
+
+    frame: int
+    misfit_px: float | None = Field(
+        description="by how much its outline would have to grow to meet the others, pixels; null: no growing helps"
+    )
+
+
+class ViewsProblem(ValidationProblem):
+    """The same, or outlines that no one object can have: `views` is there where the type is `views-disagree`."""
+
+    views: list[ViewMisfit] = Field(default_factory=list[ViewMisfit], description="those concerned, the worst first")
+
+
 class StaleProblem(Problem):
     """`If-Match` names a revision that is not the current one."""
 
@@ -94,14 +112,18 @@ DESCRIPTIONS: dict[int, tuple[type[Problem], str]] = {
 }
 
 
-def documented(*statuses: int) -> dict[int | str, dict[str, Any]]:
-    """The `responses` of a route: the problems that any route may answer, and `statuses`."""
+def documented(*statuses: int, views: bool = False) -> dict[int | str, dict[str, Any]]:
+    """The `responses` of a route: the problems that any route may answer, and `statuses`; `views`: it may find that
+    outlines do not fit one object."""
+    models = {status: DESCRIPTIONS[status][0] for status in sorted({401, 403, 421, 422, 500, 503, *statuses})}
+    if views:
+        models[422] = ViewsProblem
     return {
         status: {
             "description": DESCRIPTIONS[status][1],
-            "content": {MEDIA_TYPE: {"schema": {"$ref": f"#/components/schemas/{DESCRIPTIONS[status][0].__name__}"}}},
+            "content": {MEDIA_TYPE: {"schema": {"$ref": f"#/components/schemas/{model.__name__}"}}},
         }
-        for status in sorted({401, 403, 421, 422, 500, 503, *statuses})
+        for status, model in models.items()
     }
 
 
@@ -124,7 +146,14 @@ def of_error(error: ArsError, *, conditional: bool = False) -> ProblemResponse:
     if isinstance(error, Conflict):
         status = 412 if conditional else status
         return ProblemResponse(status, kind, title, str(error), current=current_json(error.current))
+    if isinstance(error, ViewsDisagree):
+        return ProblemResponse(status, kind, title, str(error), views=misfits_json(error))
     return ProblemResponse(status, kind, title, str(error))
+
+
+def misfits_json(error: ViewsDisagree) -> list[dict[str, Any]]:
+    """The views that disagree, as ViewMisfit has them."""
+    return [{"frame": frame, "misfit_px": pixels if math.isfinite(pixels) else None} for frame, pixels in error.misfits]
 
 
 class PreconditionMissing(Exception):

@@ -1,6 +1,7 @@
 """Every error is a problem document, and tells no more than it should."""
 
 import logging
+import math
 
 import httpx
 import pytest
@@ -19,13 +20,20 @@ def test_every_error_has_its_row() -> None:
 
 @pytest.mark.parametrize("error", STATUS)
 def test_a_row_is_what_is_answered(error: type[errors.ArsError]) -> None:
-    made = error("here", "is wrong") if error is errors.BadFile else error("here is wrong")
+    more = {errors.BadFile: ("is wrong",), errors.ViewsDisagree: (((3, 1.5),),)}
+    made = error("here is wrong", *more.get(error, ()))
     answer = of_error(made)
     body = httpx.Response(200, content=answer.body).json()
     assert answer.status_code == body["status"] == STATUS[error][0]
     assert body["type"] == f"urn:ars-web:problem:{STATUS[error][1]}"
     assert body["title"] == STATUS[error][2]
     assert "is wrong" in body["detail"]
+
+
+def test_views_that_disagree_are_named_with_their_pixels_if_any_number_helps() -> None:
+    answer = of_error(errors.ViewsDisagree("frames 4 and 2 do not meet", ((4, 12.5), (2, math.nan))))
+    views = httpx.Response(200, content=answer.body).json()["views"]
+    assert views == [{"frame": 4, "misfit_px": 12.5}, {"frame": 2, "misfit_px": None}]
 
 
 def test_a_conflict_is_a_failed_precondition_only_where_there_was_one() -> None:
