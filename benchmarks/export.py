@@ -59,7 +59,7 @@ def make_images(folder: Path, n: int, camera: Camera) -> list[Path]:
 def snapshot_of(paths: list[Path], camera: Camera, Ts: np.ndarray, *, boxes: int) -> SessionSnapshot:
     names = tuple(path.name for path in paths)
     classes = {i: ObjectClass(i, f"class {i}", "#e6194b", 1) for i in range(5)}
-    virtual = {i: VirtualBox(i, i % 5, f"box {i}", box, False, 1) for i, box in enumerate(scene.boxes(boxes), start=1)}
+    virtual = {i: VirtualBox(i, i % 5, f"box {i}", box, 1) for i, box in enumerate(scene.boxes(boxes), start=1)}
     state = SessionState(1, "benchmark", classes, virtual, 5, boxes + 1)
     frames = FrameTable(names, tuple(paths), np.zeros(len(paths), dtype=np.int64), Ts)
     return SessionSnapshot("bench", state, {0: camera}, frames)

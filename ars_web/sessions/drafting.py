@@ -69,9 +69,7 @@ def _drafted(state: SessionState, draft: BoxDraft, box_id: int, names: FreshName
     a_class = existing_class(state, draft.class_id)
     name = names.give(a_class.name) if draft.name is None else checked_name(draft.name, what="a box")
     names.take(name)
-    return VirtualBox(
-        box_id, a_class.id, name, draft.box, has_hull=False, revision=state.revision + 1, locked=draft.locked
-    )
+    return VirtualBox(box_id, a_class.id, name, draft.box, revision=state.revision + 1, locked=draft.locked)
 
 
 def changed_box(

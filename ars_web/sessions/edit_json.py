@@ -179,7 +179,6 @@ def _box(item: Json) -> VirtualBox:
         class_id=_whole(item, "class_id"),
         name=checked_name(item["name"], what="a box"),
         box=Box(T, np.array(item["size"], dtype=np.float64)),
-        has_hull=bool(item["has_hull"]),
         revision=_whole(item, "revision"),
         # Logs from before there were locks do not say.
         locked=bool(item.get("locked", False)),

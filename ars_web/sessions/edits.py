@@ -85,7 +85,8 @@ def same_content(a: Thing | None, b: Thing | None) -> bool:
         return (a.id, a.name, a.color, a.default_size) == (b.id, b.name, b.color, b.default_size)
     if isinstance(a, VirtualBox) and isinstance(b, VirtualBox):
         return (
-            (a.id, a.class_id, a.name, a.has_hull, a.locked) == (b.id, b.class_id, b.name, b.has_hull, b.locked)
+            (a.id, a.class_id, a.name, a.locked, a.hull, a.hull_options)
+            == (b.id, b.class_id, b.name, b.locked, b.hull, b.hull_options)
             and np.array_equal(a.box.T_world_box, b.box.T_world_box)
             and np.array_equal(a.box.size, b.box.size)
         )

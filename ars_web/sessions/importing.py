@@ -43,7 +43,6 @@ def starting_state(recording: Recording, *, name: str, class_names: Sequence[str
             class_id=by_name[class_name],
             name=names.give(class_name),
             box=recorded.box,
-            has_hull=False,
             revision=0,
         )
     return SessionState(

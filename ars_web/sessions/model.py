@@ -1,14 +1,26 @@
 """What an annotation session holds. Everything here is immutable; `edits.py` says how one state becomes the next."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
 
 from ars_web.geometry.box import Box
 from ars_web.geometry.camera import Camera
+from ars_web.geometry.polygon import Polygon
+from ars_web.sessions.hull_mesh import HullMesh
+
+Orientation = Literal["world", "upright", "free"]
+Position = Literal["box", "mass"]
+Origin = Literal["drawn", "smart", "proposed"]
+
+ORIENTATIONS: tuple[Orientation, ...] = ("world", "upright", "free")
+POSITIONS: tuple[Position, ...] = ("box", "mass")
+ORIGINS: tuple[Origin, ...] = ("drawn", "smart", "proposed")
 
 
 @dataclass(frozen=True)
@@ -30,6 +42,49 @@ class ObjectClass:
     default_size: tuple[float, float, float] | None = None
 
 
+@dataclass(frozen=True)
+class HullOptions:
+    """How a box was made from its object's masks, so that it can be made again when they change.
+
+    Attributes:
+        orientation: of the box's axes: the world's, upright (turned about the world's z), or free.
+        position: what the box's centre is: its own, or the hull's centre of mass.
+        widen: pixels that every mask is widened by, for poses that are a little off.
+        ground: z in the world, metres, of a support plane under the object; None: there is none.
+    """
+
+    orientation: Orientation = "world"
+    position: Position = "box"
+    widen: float = 0.0
+    ground: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Mask:
+    """The outline of one object in one frame; an object has at most one in each.
+
+    Attributes:
+        id: from 1, in the order of creation, never used again.
+        box_id: the object's box, or the id that is kept for it while there is none yet.
+        frame: index.
+        class_id: an existing class of the session; the box's, where there is one.
+        polygons: at least one; what is inside is told by the even-odd rule over all their rings together. Image
+            coordinates of the original image, in whole thousandths of a pixel.
+        origin: drawn by hand, by the smart tool, or proposed by the program.
+        accepted: whether it counts for the hull; one that does not waits for a yes or a no.
+        revision: the session's revision that last changed it; its ETag.
+    """
+
+    id: int
+    box_id: int
+    frame: int
+    class_id: int
+    polygons: tuple[Polygon, ...]
+    origin: Origin
+    accepted: bool
+    revision: int
+
+
 @dataclass(frozen=True, eq=False)
 class VirtualBox:
     """A box round one object.
@@ -39,18 +94,25 @@ class VirtualBox:
         class_id: an existing class of the session.
         name: shown to people; not empty, need not be unique.
         box: its place and size.
-        has_hull: whether a visual hull is stored with it.
         revision: the session's revision that last changed it; its ETag.
-        locked: its class, place and size are not changed, nor is it deleted, until it is unlocked.
+        locked: its class, place, size, hull and masks are not changed, nor is it deleted, until it is unlocked.
+        hull: the digest of the hull that is stored with it, in units of its sizes; None: it has none.
+        hull_options: how box and hull were made from the masks; None: they were not.
     """
 
     id: int
     class_id: int
     name: str
     box: Box
-    has_hull: bool
     revision: int
     locked: bool = False
+    hull: str | None = None
+    hull_options: HullOptions | None = None
+
+    @property
+    def has_hull(self) -> bool:
+        """Whether a visual hull is stored with it."""
+        return self.hull is not None
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +166,8 @@ class SessionState:
     Attributes:
         classes: by id, ascending.
         boxes: by id, ascending.
-        next_class_id, next_box_id: what the next of each is called; never decreases, also not by undo.
+        next_class_id, next_box_id, next_mask_id: what the next of each is called; never decreases, also not by undo.
+        masks: by id, ascending.
     """
 
     revision: int
@@ -113,13 +176,25 @@ class SessionState:
     boxes: dict[int, VirtualBox]
     next_class_id: int
     next_box_id: int
+    masks: dict[int, Mask] = field(default_factory=dict[int, Mask])
+    next_mask_id: int = 1
+
+    def masks_of(self, box_id: int) -> tuple[Mask, ...]:
+        """The masks of one object, by frame."""
+        found = (mask for mask in self.masks.values() if mask.box_id == box_id)
+        return tuple(sorted(found, key=lambda mask: mask.frame))
 
 
 @dataclass(frozen=True, eq=False)
 class SessionSnapshot:
-    """One session, whole, at one revision: what exports and previews are computed from."""
+    """One session, whole, at one revision: what exports and previews are computed from.
+
+    Attributes:
+        hulls: those of its boxes, by digest.
+    """
 
     id: str
     state: SessionState
     cameras: dict[int, Camera]
     frames: FrameTable
+    hulls: Mapping[str, HullMesh] = field(default_factory=dict[str, HullMesh])

@@ -323,7 +323,7 @@ def _class(row: Row[Any]) -> ObjectClass:
 
 def _box(row: Row[Any]) -> VirtualBox:
     box = Box(_transforms(row.pose, count=1)[0], np.array([row.size_x, row.size_y, row.size_z]))
-    return VirtualBox(row.id, row.class_id, row.name, box, row.has_hull, row.revision, row.locked)
+    return VirtualBox(row.id, row.class_id, row.name, box, row.revision, row.locked)
 
 
 def _box_row(box: VirtualBox) -> dict[str, Any]:

@@ -78,7 +78,7 @@ def make_snapshot(tmp_path: Path) -> Callable[..., SessionSnapshot]:
             name=f"session {sid}",
             classes={i: ObjectClass(i, name, "#e6194b", 1) for i, name in enumerate(classes)},
             boxes={
-                i: VirtualBox(i, (i - 1) % len(classes), f"box {i}", box, False, 1) for i, box in enumerate(objects, 1)
+                i: VirtualBox(i, (i - 1) % len(classes), f"box {i}", box, 1) for i, box in enumerate(objects, 1)
             },
             next_class_id=len(classes),
             next_box_id=len(objects) + 1,

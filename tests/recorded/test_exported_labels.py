@@ -41,7 +41,7 @@ def snapshot_of(folder: Path, objects: list[dict[str, object]]) -> SessionSnapsh
         revision=1,
         name=folder.name,
         classes={i: ObjectClass(i, f"{i} {o['label']}", "#e6194b", 1) for i, o in enumerate(objects)},
-        boxes={i: VirtualBox(i, i - 1, str(i), box, False, 1) for i, box in enumerate(boxes, start=1)},
+        boxes={i: VirtualBox(i, i - 1, str(i), box, 1) for i, box in enumerate(boxes, start=1)},
         next_class_id=len(objects),
         next_box_id=len(objects) + 1,
     )

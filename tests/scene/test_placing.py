@@ -65,7 +65,7 @@ def test_a_frame_that_sees_no_ground_puts_it_as_far_as_other_boxes_or_the_focus(
 def test_a_class_says_its_size_or_its_boxes_do_or_the_recording() -> None:
     mug = ObjectClass(0, "mug", "#56b4e9", 1)
     boxes = [
-        VirtualBox(i, 0, "mug", box_at(0.0, 0.0, 0.0, size=(0.1 * i, 0.2, 0.3)), False, 1) for i in (1, 2, 9)
+        VirtualBox(i, 0, "mug", box_at(0.0, 0.0, 0.0, size=(0.1 * i, 0.2, 0.3)), 1) for i in (1, 2, 9)
     ]  # fmt: skip
     stated = ObjectClass(0, "mug", "#56b4e9", 1, default_size=(0.085, 0.085, 0.12))
     assert usual_size(stated, boxes, extent=EXTENT).tolist() == [0.085, 0.085, 0.12]

@@ -22,7 +22,7 @@ GOOD = {"class_id": 0, "T_world_box": {"position": [0, 0.5, 1], "wxyz": [2, 0, 0
 
 def test_a_box_is_written_as_the_contract_says():
     T = rigid_transform.from_position_wxyz(np.array([1.0, 2.0, 3.0]), np.array([-0.5, 0.5, 0.5, 0.5]))
-    written = box_json(VirtualBox(7, 1, "left", Box(T, np.array([0.1, 0.2, 0.3])), False, 12))
+    written = box_json(VirtualBox(7, 1, "left", Box(T, np.array([0.1, 0.2, 0.3])), 12))
     assert list(written) == ["id", "class_id", "name", "T_world_box", "size", "has_hull", "locked", "revision"]
     assert written["locked"] is False
     assert written["T_world_box"]["position"] == [1.0, 2.0, 3.0]
@@ -45,7 +45,7 @@ def test_what_is_written_is_a_unit_quaternion_and_reads_as_the_same_place(
 ):
     given_box = BoxJson.model_validate({**GOOD, "T_world_box": {"position": position, "wxyz": wxyz}})
     box = given_box.draft.box
-    written = json.loads(json.dumps(box_json(VirtualBox(1, 0, "b", box, False, 1))))
+    written = json.loads(json.dumps(box_json(VirtualBox(1, 0, "b", box, 1))))
     assert np.linalg.norm(written["T_world_box"]["wxyz"]) == pytest.approx(1, abs=1e-12)
     assert written["T_world_box"]["wxyz"][0] >= 0
     again = BoxJson.model_validate({key: written[key] for key in ("class_id", "T_world_box", "size")}).draft.box

@@ -41,7 +41,7 @@ def cube_class(revision: int = 1, name: str = "cube", id_: int = 0) -> ObjectCla
 
 def a_box(revision: int, x: float = 0.0, id_: int = 1, class_id: int = 0) -> VirtualBox:
     T = rigid_transform.from_position_wxyz(np.array([x, 0.1, 0.2]), np.array([1.0, 0.2, 0.3, x]))
-    return VirtualBox(id_, class_id, "cube", Box(T, np.array([0.1, 0.2, 0.3])), False, revision)
+    return VirtualBox(id_, class_id, "cube", Box(T, np.array([0.1, 0.2, 0.3])), revision)
 
 
 def with_a_box() -> SessionState:
@@ -110,7 +110,7 @@ numbers = st.floats(-1e3, 1e3, allow_nan=False)
 boxes = st.builds(
     lambda id_, position, wxyz, size, revision: VirtualBox(
         id_, 0, "b", Box(rigid_transform.from_position_wxyz(np.array(position), np.array(wxyz)), np.array(size)),
-        False, revision,
+        revision,
     ),
     st.integers(1, 5),
     st.tuples(numbers, numbers, numbers),

@@ -151,7 +151,7 @@ def test_the_view_stays_with_a_box_from_frame_to_frame(in_frame: Any, until: Cal
     page, middle = in_frame.page, np.array([500.0, 350.0])
     centre = rigid_transform.transform_points(in_frame.view._poses[0], np.array([[0.1, -0.05, 1.0]]))[0]
     box = Box(rigid_transform.from_rotation(rigid_transform.rotation_about_z(0.3), centre), np.full(3, 0.08))
-    stored = VirtualBox(7, 0, "mug", box, has_hull=False, revision=1)
+    stored = VirtualBox(7, 0, "mug", box, revision=1)
     in_frame.nodes.show(SessionState(1, "s", {0: ObjectClass(0, "mug", "#56b4e9", 1)}, {7: stored}, 1, 2))
     in_frame.scene.wait_for_function("() => Boolean(__viserMutable.nodeRefFromName['/boxes/7/at/edges'])")
 

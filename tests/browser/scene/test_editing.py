@@ -25,7 +25,7 @@ EYE, TARGET = np.array([0.55, -0.75, 0.6]), np.array([0.0, 0.0, 0.1])
 def a_state() -> SessionState:
     R = rigid_transform.rotation_about_z(0.4)
     box = Box(rigid_transform.from_rotation(R, np.array([0.02, 0.03, 0.1])), np.array([0.085, 0.12, 0.2]))
-    stored = VirtualBox(1, 0, "mug", box, has_hull=False, revision=1)
+    stored = VirtualBox(1, 0, "mug", box, revision=1)
     return SessionState(1, "s", {0: ObjectClass(0, "mug", "#56b4e9", 1)}, {1: stored}, 1, 2)
 
 
