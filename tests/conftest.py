@@ -1,11 +1,13 @@
 """What every test stands on: shapes checked at run time, and the recorded data where it is present."""
 
+import importlib.util
 import os
 import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 from hypothesis import settings
@@ -74,6 +76,17 @@ def _served(sessions: Path, *options: str) -> Iterator[tuple[subprocess.Popen[st
 def served():
     """`with served(sessions, *options) as (process, login_url)`: a server process on a free port, killed at the end."""
     return _served
+
+
+@pytest.fixture(scope="session")
+def ring_scene() -> ModuleType:
+    """`ring_scene.py`: a recording round an object, with the object's outlines."""
+    spec = importlib.util.spec_from_file_location("ring_scene", Path(__file__).parent / "ring_scene.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def pytest_report_header() -> str:
