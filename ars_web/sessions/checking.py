@@ -10,9 +10,11 @@ from sqlalchemy.sql.sqltypes import Boolean, Float, LargeBinary
 
 from ars_web.errors import ArsError
 from ars_web.geometry.rigid_transform import ROTATION_TOLERANCE
-from ars_web.sessions import rows, tables
-from ars_web.sessions.edits import differences, replay
+from ars_web.sessions import hull_rows, rows, tables
+from ars_web.sessions.edits import BoxChange, Edit, differences, replay
+from ars_web.sessions.model import SessionState
 from ars_web.sessions.names import checked_image_name
+from ars_web.sessions.outlines import checked_polygons
 
 _STORED_AS = {Boolean: ("integer",), Integer: ("integer",), Float: ("real", "integer"), LargeBinary: ("blob",)}
 
@@ -51,7 +53,8 @@ def check_database(connection: Connection) -> list[str]:
 def check_contents(connection: Connection) -> list[str]:
     """What is wrong with the log, the state and the recording; what cannot be read at all ends the search."""
     try:
-        return check_log(connection) + check_recording(connection)
+        # Masks name frames, which must be sound.
+        return check_log(connection) + check_recording(connection) or check_masks(connection)
     except (ArsError, ValueError, TypeError, AttributeError) as error:
         return [f"the session cannot be read: {error}"]
 
@@ -92,7 +95,27 @@ def check_log(connection: Connection) -> list[str]:
         unlike = differences(replay(origin, edits), state)
     except ArsError as error:
         return [*problems, f"the log cannot be replayed: {error}"]
+    missing = sorted(_hulls_named(origin, edits) - {hull.digest for hull in hull_rows.all_hulls(connection)})
+    problems += [f"a box of the log has hull {digest}, which is not there" for digest in missing[:5]]
     return problems + [f"the log and the tables differ in {what}" for what in unlike[:5]]
+
+
+def _hulls_named(origin: SessionState, edits: list[Edit]) -> set[str]:
+    changes = (change for edit in edits for change in edit.changes if isinstance(change, BoxChange))
+    boxes = (*origin.boxes.values(), *(box for change in changes for box in (change.before, change.after)))
+    return {box.hull for box in boxes if box is not None and box.hull is not None}
+
+
+def check_masks(connection: Connection) -> list[str]:
+    """Whether every outline can be one of its frame's image."""
+    frames, cameras = rows.load_frames(connection, Path()), rows.load_cameras(connection)
+    for mask in rows.load_state(connection).masks.values():
+        camera = cameras[int(frames.camera_ids[mask.frame])]
+        try:
+            checked_polygons(mask.polygons, width=camera.width, height=camera.height)
+        except ArsError as error:
+            return [f"mask {mask.id}, of object {mask.box_id} in frame {mask.frame}: {error}"]
+    return []
 
 
 def check_recording(connection: Connection) -> list[str]:

@@ -1,4 +1,4 @@
-"""Edits, classes and boxes as the JSON that the log keeps. Every float comes back bit by bit."""
+"""Edits, classes, boxes and masks as the JSON that the log keeps. Every float comes back bit by bit."""
 
 import hashlib
 from datetime import UTC, datetime
@@ -10,9 +10,11 @@ import orjson
 from ars_web.errors import ArsError, BadInput, StoreError
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box
-from ars_web.sessions.edits import BoxChange, Change, ClassChange, NameChange
-from ars_web.sessions.model import ObjectClass, SessionState, VirtualBox
+from ars_web.sessions.edits import BoxChange, Change, ClassChange, MaskChange, NameChange
+from ars_web.sessions.hull_json import digest_from_json, options_from_json, options_json
+from ars_web.sessions.model import Mask, ObjectClass, SessionState, VirtualBox, checked_origin
 from ars_web.sessions.names import checked_name
+from ars_web.sessions.outlines import polygons_from_json, polygons_json
 from ars_web.sessions.palette import checked_color
 from ars_web.sessions.sizes import checked_class_size
 
@@ -44,8 +46,10 @@ def state_json(state: SessionState) -> str:
             "name": state.name,
             "classes": [_class_json(a_class) for a_class in state.classes.values()],
             "boxes": [_box_json(box) for box in state.boxes.values()],
+            "masks": [_mask_json(mask) for mask in state.masks.values()],
             "next_class_id": state.next_class_id,
             "next_box_id": state.next_box_id,
+            "next_mask_id": state.next_mask_id,
         }
     ).decode()
 
@@ -65,6 +69,9 @@ def state_from_json(text: str) -> SessionState:
             boxes={b["id"]: _box(b) for b in item["boxes"]},
             next_class_id=_whole(item, "next_class_id"),
             next_box_id=_whole(item, "next_box_id"),
+            # Sessions from before there were masks do not say.
+            masks={m["id"]: _mask(m) for m in item.get("masks", [])},
+            next_mask_id=_whole(item, "next_mask_id") if "next_mask_id" in item else 1,
         )
     except (ValueError, KeyError, TypeError, AttributeError, ArsError) as error:
         raise StoreError(f"the state that the session's log starts from cannot be read: {error}") from error
@@ -116,6 +123,12 @@ def _change_json(change: Change) -> Json:
             "before": None if change.before is None else _box_json(change.before),
             "after": None if change.after is None else _box_json(change.after),
         }
+    if isinstance(change, MaskChange):
+        return {
+            "mask": change.mask_id,
+            "before": None if change.before is None else _mask_json(change.before),
+            "after": None if change.after is None else _mask_json(change.after),
+        }
     return {
         "class": change.class_id,
         "before": None if change.before is None else _class_json(change.before),
@@ -130,6 +143,10 @@ def _change(item: Json) -> Change:
     if "class" in item:
         return ClassChange(
             _whole(item, "class"), None if before is None else _class(before), None if after is None else _class(after)
+        )
+    if "mask" in item:
+        return MaskChange(
+            _whole(item, "mask"), None if before is None else _mask(before), None if after is None else _mask(after)
         )
     return NameChange(checked_name(before, what="a session"), checked_name(after, what="a session"))
 
@@ -164,9 +181,10 @@ def _box_json(box: VirtualBox) -> Json:
         "rotation": box.box.T_world_box[:3, :3].ravel().tolist(),
         "position": box.box.T_world_box[:3, 3].tolist(),
         "size": box.box.size.tolist(),
-        "has_hull": box.has_hull,
         "revision": box.revision,
         "locked": box.locked,
+        "hull": box.hull,
+        "hull_options": None if box.hull_options is None else options_json(box.hull_options),
     }
 
 
@@ -180,8 +198,36 @@ def _box(item: Json) -> VirtualBox:
         name=checked_name(item["name"], what="a box"),
         box=Box(T, np.array(item["size"], dtype=np.float64)),
         revision=_whole(item, "revision"),
-        # Logs from before there were locks do not say.
+        # Logs from before there were locks, or hulls, do not say.
         locked=bool(item.get("locked", False)),
+        hull=None if item.get("hull") is None else digest_from_json(item["hull"]),
+        hull_options=None if item.get("hull_options") is None else options_from_json(item["hull_options"]),
+    )
+
+
+def _mask_json(mask: Mask) -> Json:
+    return {
+        "id": mask.id,
+        "box_id": mask.box_id,
+        "frame": mask.frame,
+        "class_id": mask.class_id,
+        "polygons": polygons_json(mask.polygons),
+        "origin": mask.origin,
+        "accepted": mask.accepted,
+        "revision": mask.revision,
+    }
+
+
+def _mask(item: Json) -> Mask:
+    return Mask(
+        id=_whole(item, "id"),
+        box_id=_whole(item, "box_id"),
+        frame=_whole(item, "frame"),
+        class_id=_whole(item, "class_id"),
+        polygons=polygons_from_json(item["polygons"]),
+        origin=checked_origin(item["origin"]),
+        accepted=bool(item["accepted"]),
+        revision=_whole(item, "revision"),
     )
 
 

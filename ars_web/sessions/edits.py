@@ -13,7 +13,8 @@ from typing import TypeVar
 import numpy as np
 
 from ars_web.errors import Conflict
-from ars_web.sessions.model import ObjectClass, SessionState, VirtualBox
+from ars_web.sessions.model import Mask, ObjectClass, SessionState, VirtualBox
+from ars_web.sessions.outlines import same_polygons
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +35,21 @@ class ClassChange:
     after: ObjectClass | None
 
 
+@dataclass(frozen=True, eq=False)
+class MaskChange:
+    """One mask from `before` to `after`; None before: it is added; None after: it is deleted."""
+
+    mask_id: int
+    before: Mask | None
+    after: Mask | None
+
+    @property
+    def box_id(self) -> int:
+        """The object's."""
+        known = self.before or self.after
+        return 0 if known is None else known.box_id
+
+
 @dataclass(frozen=True)
 class NameChange:
     """The session's own name."""
@@ -42,7 +58,7 @@ class NameChange:
     after: str
 
 
-Change = BoxChange | ClassChange | NameChange
+Change = BoxChange | ClassChange | MaskChange | NameChange
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +69,7 @@ class Edit:
         revision: the session's revision after it, gap-free from 1.
         author: who, as the door that took it in calls them (`local`, `cli`, a page's user); undo is each author's own.
         summary: one line for the history, such as `Move cube`.
-        changes: applied together or not at all; no box and no class occurs twice in them.
+        changes: applied together or not at all; no box, class or mask occurs twice in them.
         undoes: the revision whose edit this one inverts, for undo; None otherwise.
         redoes: the revision of the undo that this one inverts, for redo; None otherwise.
         at: UTC.
@@ -75,12 +91,12 @@ class Edit:
         return self.summary.removeprefix("Undo: ").removeprefix("Redo: ")
 
 
-Thing = VirtualBox | ObjectClass
-T = TypeVar("T", VirtualBox, ObjectClass)
+Thing = VirtualBox | ObjectClass | Mask
+T = TypeVar("T", VirtualBox, ObjectClass, Mask)
 
 
 def same_content(a: Thing | None, b: Thing | None) -> bool:
-    """Whether two boxes, or two classes, are alike in everything but the revision that made them so."""
+    """Whether two boxes, classes or masks are alike in everything but the revision that made them so."""
     if isinstance(a, ObjectClass) and isinstance(b, ObjectClass):
         return (a.id, a.name, a.color, a.default_size) == (b.id, b.name, b.color, b.default_size)
     if isinstance(a, VirtualBox) and isinstance(b, VirtualBox):
@@ -90,11 +106,16 @@ def same_content(a: Thing | None, b: Thing | None) -> bool:
             and np.array_equal(a.box.T_world_box, b.box.T_world_box)
             and np.array_equal(a.box.size, b.box.size)
         )
+    if isinstance(a, Mask) and isinstance(b, Mask):
+        return (
+            (a.id, a.box_id, a.frame, a.class_id, a.origin, a.accepted)
+            == (b.id, b.box_id, b.frame, b.class_id, b.origin, b.accepted)
+        ) and same_polygons(a.polygons, b.polygons)
     return a is None and b is None
 
 
 def same(a: Thing | None, b: Thing | None) -> bool:
-    """Whether two boxes, or two classes, are alike, their revisions included."""
+    """Whether two boxes, classes or masks are alike, their revisions included."""
     return same_content(a, b) and (a is None or b is None or a.revision == b.revision)
 
 
@@ -109,7 +130,7 @@ def restated(changes: Sequence[Change], state: SessionState, *, revision: int) -
     What they expect to find must be there; only who last touched it, its revision, may differ.
 
     Raises:
-        Conflict: a box, a class or the name is not what the changes expect; `current` is what it is.
+        Conflict: a box, a class, a mask or the name is not what the changes expect; `current` is what it is.
     """
     out: list[Change] = []
     for change in changes:
@@ -121,6 +142,11 @@ def restated(changes: Sequence[Change], state: SessionState, *, revision: int) -
             if not same_content(found, change.before):
                 raise Conflict(_moved_on(change, found), current=found)
             out.append(BoxChange(change.box_id, found, _at(change.after, revision)))
+        elif isinstance(change, MaskChange):
+            found = state.masks.get(change.mask_id)
+            if not same_content(found, change.before):
+                raise Conflict(_moved_on(change, found), current=found)
+            out.append(MaskChange(change.mask_id, found, _at(change.after, revision)))
         else:
             found = state.classes.get(change.class_id)
             if not same_content(found, change.before):
@@ -137,31 +163,36 @@ def apply(state: SessionState, edit: Edit) -> SessionState:
     """The state after `edit`.
 
     Raises:
-        Conflict: the edit is not the next one, does not find what it expects, or would leave a box without its
-            class or two classes of one name. `state` is untouched.
+        Conflict: the edit is not the next one, does not find what it expects, or would leave a box or a mask
+            without its class, two classes of one name, or two masks of one object in one frame. `state` is untouched.
     """
     if edit.revision != state.revision + 1:
         raise Conflict(f"edit {edit.revision} cannot follow revision {state.revision}")
-    classes, boxes, name = dict(state.classes), dict(state.boxes), state.name
+    classes, boxes, masks, name = dict(state.classes), dict(state.boxes), dict(state.masks), state.name
     for change in edit.changes:
         if isinstance(change, NameChange):
             _expect_name(change, name)
             name = change.after
         elif isinstance(change, BoxChange):
             _put(boxes, change.box_id, change.before, change.after, edit.revision, change)
+        elif isinstance(change, MaskChange):
+            _put(masks, change.mask_id, change.before, change.after, edit.revision, change)
         else:
             _put(classes, change.class_id, change.before, change.after, edit.revision, change)
-    _refuse_broken_links(edit.changes, classes, boxes)
+    _refuse_broken_links(edit.changes, classes, boxes, masks)
+    objects = [c.box_id + 1 for c in edit.changes if isinstance(c, BoxChange | MaskChange)]
     return SessionState(
         revision=edit.revision,
         name=name,
         classes=dict(sorted(classes.items())),
         boxes=dict(sorted(boxes.items())),
-        # An id that was given once stays given, also when undo has taken its box away.
+        masks=dict(sorted(masks.items())),
+        # An id that was given once stays given, also when undo has taken its box away; masks keep one for theirs.
         next_class_id=max(
             state.next_class_id, *(c.class_id + 1 for c in edit.changes if isinstance(c, ClassChange)), 0
         ),
-        next_box_id=max(state.next_box_id, *(c.box_id + 1 for c in edit.changes if isinstance(c, BoxChange)), 0),
+        next_box_id=max(state.next_box_id, *objects, 0),
+        next_mask_id=max(state.next_mask_id, *(c.mask_id + 1 for c in edit.changes if isinstance(c, MaskChange)), 0),
     )
 
 
@@ -177,11 +208,12 @@ def replay(origin: SessionState, edits: Iterable[Edit]) -> SessionState:
 def differences(a: SessionState, b: SessionState) -> list[str]:
     """In what two states differ, in words; empty where they are alike, bit by bit."""
     found: list[str] = []
-    for what in ("revision", "name", "next_class_id", "next_box_id"):
+    for what in ("revision", "name", "next_class_id", "next_box_id", "next_mask_id"):
         if getattr(a, what) != getattr(b, what):
             found.append(f"{what}: {getattr(a, what)!r} and {getattr(b, what)!r}")
     found += [f"class {id_}" for id_ in _unlike(a.classes, b.classes)]
     found += [f"box {id_}" for id_ in _unlike(a.boxes, b.boxes)]
+    found += [f"mask {id_}" for id_ in _unlike(a.masks, b.masks)]
     return found
 
 
@@ -190,7 +222,12 @@ def _unlike(a: Mapping[int, Thing], b: Mapping[int, Thing]) -> list[int]:
 
 
 def _put(
-    things: dict[int, T], id_: int, before: T | None, after: T | None, revision: int, change: BoxChange | ClassChange
+    things: dict[int, T],
+    id_: int,
+    before: T | None,
+    after: T | None,
+    revision: int,
+    change: BoxChange | ClassChange | MaskChange,
 ) -> None:
     found = things.get(id_)
     if not same(found, before):
@@ -199,32 +236,47 @@ def _put(
         things.pop(id_, None)
         return
     if after.id != id_ or after.revision != revision:
-        raise Conflict(f"edit {revision} leaves {after.name!r} with id {after.id} and revision {after.revision}")
+        raise Conflict(f"edit {revision} leaves {_called(after)} with id {after.id} and revision {after.revision}")
     things[id_] = after
 
 
 def _refuse_broken_links(
-    changes: Iterable[Change], classes: dict[int, ObjectClass], boxes: dict[int, VirtualBox]
+    changes: Iterable[Change],
+    classes: dict[int, ObjectClass],
+    boxes: dict[int, VirtualBox],
+    masks: dict[int, Mask],
 ) -> None:
     gone: dict[int, str] = {}
     named: set[str] = set()
+    outlined: set[int] = set()
     for change in changes:
-        if isinstance(change, BoxChange) and change.after is not None and change.after.class_id not in classes:
-            raise Conflict(f"box {change.after.name!r} needs class {change.after.class_id}, which is gone")
+        if isinstance(change, BoxChange | MaskChange) and change.after is not None:
+            if change.after.class_id not in classes:
+                raise Conflict(f"{_called(change.after)} needs class {change.after.class_id}, which is gone")
+        if isinstance(change, MaskChange) and change.after is not None:
+            outlined.add(change.after.box_id)
         if isinstance(change, ClassChange) and change.before is not None and change.after is None:
             gone[change.class_id] = change.before.name
         if isinstance(change, ClassChange) and change.after is not None:
             named.add(change.after.name)
     if gone:
-        for box in boxes.values():
-            if box.class_id in gone:
-                raise Conflict(f"box {box.name!r} uses class {gone[box.class_id]!r}: delete the box first", current=box)
+        for user in (*boxes.values(), *masks.values()):
+            if user.class_id in gone:
+                it = "the box" if isinstance(user, VirtualBox) else "the mask"
+                raise Conflict(f"{_called(user)} uses class {gone[user.class_id]!r}: delete {it} first", current=user)
     if named:
         seen: set[str] = set()
         for a_class in classes.values():
             if a_class.name in seen:
                 raise Conflict(f"there is another class called {a_class.name!r}", current=a_class)
             seen.add(a_class.name)
+    if outlined:
+        places: set[tuple[int, int]] = set()
+        for mask in masks.values():
+            place = (mask.box_id, mask.frame)
+            if mask.box_id in outlined and place in places:
+                raise Conflict(f"there is another {_called(mask)}", current=mask)
+            places.add(place)
 
 
 def _expect_name(change: NameChange, name: str) -> None:
@@ -232,10 +284,20 @@ def _expect_name(change: NameChange, name: str) -> None:
         raise Conflict(f"the session was renamed to {name!r} meanwhile", current=name)
 
 
-def _moved_on(change: BoxChange | ClassChange, found: Thing | None) -> str:
-    kind, id_ = ("box", change.box_id) if isinstance(change, BoxChange) else ("class", change.class_id)
-    known = found or change.before or change.after
-    what = f"{kind} {id_} ({known.name!r})" if known else f"{kind} {id_}"
+def _called(thing: Thing) -> str:
+    if isinstance(thing, Mask):
+        return f"mask of object {thing.box_id} in frame {thing.frame}"
+    return f"{'box' if isinstance(thing, VirtualBox) else 'class'} {thing.name!r}"
+
+
+def _moved_on(change: BoxChange | ClassChange | MaskChange, found: Thing | None) -> str:
+    if isinstance(change, MaskChange):
+        known = found or change.before or change.after
+        what = f"mask {change.mask_id}" + (f" ({_called(known)})" if known else "")
+    else:
+        kind, id_ = ("box", change.box_id) if isinstance(change, BoxChange) else ("class", change.class_id)
+        known = found or change.before or change.after
+        what = f"{kind} {id_} ({known.name!r})" if known and not isinstance(known, Mask) else f"{kind} {id_}"
     if found is None:
         return f"{what} was deleted meanwhile"
     return f"{what} was changed meanwhile, in revision {found.revision}"

@@ -9,7 +9,8 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from ars_web.geometry.box import Box
+from ars_web.errors import BadInput
+from ars_web.geometry.box import FARTHEST, Box
 from ars_web.geometry.camera import Camera
 from ars_web.geometry.polygon import Polygon
 from ars_web.sessions.hull_mesh import HullMesh
@@ -21,6 +22,21 @@ Origin = Literal["drawn", "smart", "proposed"]
 ORIENTATIONS: tuple[Orientation, ...] = ("world", "upright", "free")
 POSITIONS: tuple[Position, ...] = ("box", "mass")
 ORIGINS: tuple[Origin, ...] = ("drawn", "smart", "proposed")
+
+WIDEST = 100.0
+"""Pixels that masks may be widened by."""
+
+
+def checked_origin(origin: str) -> Origin:
+    """Who made an outline.
+
+    Raises:
+        BadInput: it is none of ORIGINS.
+    """
+    for known in ORIGINS:
+        if origin == known:
+            return known
+    raise BadInput(f"a mask's origin must be one of {', '.join(ORIGINS)}, not {origin!r}")
 
 
 @dataclass(frozen=True)
@@ -57,6 +73,17 @@ class HullOptions:
     position: Position = "box"
     widen: float = 0.0
     ground: float | None = None
+
+    def __post_init__(self) -> None:
+        """Raises BadInput for what none of them can be."""
+        if self.orientation not in ORIENTATIONS:
+            raise BadInput(f"a box's orientation must be one of {', '.join(ORIENTATIONS)}, not {self.orientation!r}")
+        if self.position not in POSITIONS:
+            raise BadInput(f"a box's position must be one of {', '.join(POSITIONS)}, not {self.position!r}")
+        if not 0.0 <= self.widen <= WIDEST:
+            raise BadInput(f"masks can be widened by 0 to {WIDEST:g} pixels, not {self.widen}")
+        if self.ground is not None and not abs(self.ground) <= FARTHEST:
+            raise BadInput(f"a support plane must be within {FARTHEST:g} m of z = 0, not at {self.ground}")
 
 
 @dataclass(frozen=True, eq=False)

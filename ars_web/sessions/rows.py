@@ -16,7 +16,7 @@ from ars_web.errors import StoreError
 from ars_web.geometry.box import Box
 from ars_web.geometry.camera import Camera
 from ars_web.recordings.recording import Recording, SkippedFrame
-from ars_web.sessions import tables
+from ars_web.sessions import hull_rows, mask_rows, tables
 from ars_web.sessions.edit_json import (
     changes_from_json,
     changes_json,
@@ -26,7 +26,7 @@ from ars_web.sessions.edit_json import (
     utc_from_text,
     utc_text,
 )
-from ars_web.sessions.edits import BoxChange, ClassChange, Edit
+from ars_web.sessions.edits import BoxChange, ClassChange, Edit, MaskChange
 from ars_web.sessions.history import LogEntry
 from ars_web.sessions.model import FrameTable, ObjectClass, SessionState, SessionSummary, VirtualBox
 
@@ -87,6 +87,8 @@ def load_state(connection: Connection) -> SessionState:
         boxes={b.id: _box(b) for b in boxes},
         next_class_id=row.next_class_id,
         next_box_id=row.next_box_id,
+        masks=mask_rows.load_masks(connection),
+        next_mask_id=row.next_mask_id,
     )
 
 
@@ -210,6 +212,7 @@ def insert_recording(
             revision=state.revision,
             next_class_id=state.next_class_id,
             next_box_id=state.next_box_id,
+            next_mask_id=state.next_mask_id,
             format=recording.format,
             source=str(recording.source),
             created=utc_text(at),
@@ -269,7 +272,7 @@ def append_edit(connection: Connection, edit: Edit, state: SessionState) -> None
 
 def apply_edit(connection: Connection, edit: Edit, state: SessionState) -> None:
     """Bring the tables to `state`, touching only what `edit` changes."""
-    # A class may be made with the boxes that use it, and only goes when they are gone.
+    # A class may be made with the boxes and masks that use it, and only goes when they are gone.
     classes = [change for change in edit.changes if isinstance(change, ClassChange)]
     boxes = [change for change in edit.changes if isinstance(change, BoxChange)]
     for change in classes:
@@ -280,6 +283,7 @@ def apply_edit(connection: Connection, edit: Edit, state: SessionState) -> None:
             connection.execute(delete(tables.box).where(tables.box.c.id == change.box_id))
         else:
             _upsert(connection, tables.box, _box_row(change.after))
+    mask_rows.apply_changes(connection, [change for change in edit.changes if isinstance(change, MaskChange)])
     for change in classes:
         if change.after is None:
             connection.execute(delete(tables.object_class).where(tables.object_class.c.id == change.class_id))
@@ -289,6 +293,7 @@ def apply_edit(connection: Connection, edit: Edit, state: SessionState) -> None:
             revision=state.revision,
             next_class_id=state.next_class_id,
             next_box_id=state.next_box_id,
+            next_mask_id=state.next_mask_id,
             changed=utc_text(edit.at),
         )
     )
@@ -323,7 +328,8 @@ def _class(row: Row[Any]) -> ObjectClass:
 
 def _box(row: Row[Any]) -> VirtualBox:
     box = Box(_transforms(row.pose, count=1)[0], np.array([row.size_x, row.size_y, row.size_z]))
-    return VirtualBox(row.id, row.class_id, row.name, box, row.revision, row.locked)
+    options = hull_rows.options_from_text(row.hull_options)
+    return VirtualBox(row.id, row.class_id, row.name, box, row.revision, row.locked, row.hull, options)
 
 
 def _box_row(box: VirtualBox) -> dict[str, Any]:
@@ -336,9 +342,10 @@ def _box_row(box: VirtualBox) -> dict[str, Any]:
         "size_x": x,
         "size_y": y,
         "size_z": z,
-        "has_hull": box.has_hull,
         "revision": box.revision,
         "locked": box.locked,
+        "hull": box.hull,
+        "hull_options": hull_rows.options_text(box.hull_options),
     }
 
 

@@ -15,11 +15,12 @@ from sqlalchemy import Connection
 from ars_web.errors import ArsError, BadInput, Conflict, NotFound, StoreError
 from ars_web.geometry.camera import Camera
 from ars_web.recordings.recording import Recording, SkippedFrame
-from ars_web.sessions import rows, session_folders
+from ars_web.sessions import hull_rows, rows, session_folders
 from ars_web.sessions.checking import check_session
 from ars_web.sessions.database import Database
 from ars_web.sessions.edits import Edit, apply
 from ars_web.sessions.history import History, LogEntry, taken_back, to_redo, to_undo
+from ars_web.sessions.hull_mesh import HullMesh
 from ars_web.sessions.importing import fill, starting_state
 from ars_web.sessions.migration import back_up
 from ars_web.sessions.model import FrameTable, SessionSnapshot, SessionState, SessionSummary
@@ -44,6 +45,8 @@ class _Open:
     # Long recordings take a while to read, and a page that opens asks for a dozen images at once.
     frames_lock: threading.Lock = field(default_factory=threading.Lock)
     cameras: dict[int, Camera] | None = field(default=None)
+    # By digest, of the boxes of a recent state. What a digest names never changes.
+    hulls: dict[str, HullMesh] = field(default_factory=dict[str, HullMesh])
 
 
 class SessionStore:
@@ -206,12 +209,24 @@ class SessionStore:
     def snapshot(self, sid: str) -> SessionSnapshot:
         """The whole session at one revision."""
         with self._reading(sid) as (connection, session):
+            state = _current_state(connection, session)
             return SessionSnapshot(
                 id=sid,
-                state=_current_state(connection, session),
+                state=state,
                 cameras=dict(_cameras(connection, session)),
                 frames=self._frames(sid, connection, session),
+                hulls=_hulls(connection, session, state),
             )
+
+    def hull(self, sid: str, digest: str) -> HullMesh:
+        """A hull that a box of the session has, or had.
+
+        Raises:
+            NotFound: the session has no such hull.
+        """
+        with self._reading(sid) as (connection, session):
+            known = session.hulls.get(digest)
+            return hull_rows.load_hull(connection, digest) if known is None else known
 
     def delete(self, sid: str, *, expected_revision: int | None = None) -> None:
         """Move the session to the trash, once the edits that are being written are done.
@@ -316,6 +331,16 @@ def _cameras(connection: Connection, session: _Open) -> dict[int, Camera]:
     if session.cameras is None:
         session.cameras = rows.load_cameras(connection)
     return session.cameras
+
+
+def _hulls(connection: Connection, session: _Open, state: SessionState) -> dict[str, HullMesh]:
+    """Those of the state's boxes: the ones at hand, and the others read."""
+    known = session.hulls
+    wanted = {box.hull for box in state.boxes.values() if box.hull is not None}
+    if wanted != known.keys():
+        kept = {digest: known[digest] for digest in wanted & known.keys()}
+        known = session.hulls = {**kept, **hull_rows.load_hulls(connection, wanted - kept.keys())}
+    return dict(known)
 
 
 def _current_state(connection: Connection, session: _Open) -> SessionState:

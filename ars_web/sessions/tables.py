@@ -15,6 +15,7 @@ from sqlalchemy import (
     MetaData,
     Table,
     Text,
+    UniqueConstraint,
     false,
     text,
 )
@@ -35,6 +36,7 @@ session = Table(
     Column("changed", Text, nullable=False),
     # The state at revision 0, as JSON: what the log is replayed from.
     Column("origin", Text, nullable=False),
+    Column("next_mask_id", Integer, nullable=False, server_default=text("1")),
 )
 
 camera = Table(
@@ -94,9 +96,38 @@ box = Table(
     Column("size_x", Float, nullable=False),
     Column("size_y", Float, nullable=False),
     Column("size_z", Float, nullable=False),
-    Column("has_hull", Boolean, nullable=False, server_default=false()),
     Column("revision", Integer, nullable=False),
     Column("locked", Boolean, nullable=False, server_default=false()),
+    Column("hull", Text, ForeignKey("hull.digest", name="box_hull")),
+    # As a JSON object; NULL: it was not made from masks.
+    Column("hull_options", Text),
+)
+
+hull = Table(
+    "hull",
+    metadata,
+    # Rows are named by what they hold and never deleted: the log names them, too, and undo brings them back.
+    Column("digest", Text, primary_key=True),
+    # Three little-endian float32 a vertex, in units of the box's sizes.
+    Column("vertices", LargeBinary, nullable=False),
+    # Three little-endian int32 a face.
+    Column("faces", LargeBinary, nullable=False),
+)
+
+mask = Table(
+    "mask",
+    metadata,
+    Column("id", Integer, primary_key=True),
+    # No reference: an object may be outlined before it has a box, whose id is kept for it.
+    Column("box_id", Integer, nullable=False),
+    Column("frame", Integer, ForeignKey("frame.idx"), nullable=False),
+    Column("class_id", Integer, ForeignKey("object_class.id"), nullable=False),
+    # A JSON list, as in the log.
+    Column("polygons", Text, nullable=False),
+    Column("origin", Text, nullable=False),
+    Column("accepted", Boolean, nullable=False),
+    Column("revision", Integer, nullable=False),
+    UniqueConstraint("box_id", "frame", name="one_mask_a_frame"),
 )
 
 edit = Table(

@@ -85,23 +85,37 @@ def _make_older(path: Path, schema: str) -> None:
         connection.execute("ATTACH ? AS newer", (str(path),))
         for (table,) in connection.execute("SELECT name FROM main.sqlite_master WHERE type = 'table'").fetchall():
             if table != "alembic_version":
-                names = [row[1] for row in connection.execute(f"PRAGMA main.table_info({table})")]
-                assert not {"locked", "default_size"} & set(names)
-                columns = ", ".join(names)
+                newer, names = (
+                    [row[1] for row in connection.execute(f"PRAGMA {base}.table_info({table})")]
+                    for base in ("newer", "main")
+                )
+                # Nothing of what came later is there, and what went since has its default: no box had a hull.
+                assert not set(_LATER[schema]) & set(names)
+                assert set(names) - set(newer) <= {"has_hull"}
+                columns = ", ".join(name for name in names if name in newer)
                 connection.execute(f"INSERT INTO main.{table} ({columns}) SELECT {columns} FROM newer.{table}")
-        _forget_what_is_new(connection, "SELECT origin, id FROM session", "UPDATE session SET origin = ? WHERE id = ?")
-        log = "SELECT changes, revision FROM edit"
-        _forget_what_is_new(connection, log, "UPDATE edit SET changes = ? WHERE revision = ?")
+        for select, update in (
+            ("SELECT origin, id FROM session", "UPDATE session SET origin = ? WHERE id = ?"),
+            ("SELECT changes, revision FROM edit", "UPDATE edit SET changes = ? WHERE revision = ?"),
+        ):
+            _forget_what_is_new(connection, select, update, later=_LATER[schema])
         connection.commit()
     path.unlink()
     older.rename(path)
 
 
-def _forget_what_is_new(connection: sqlite3.Connection, select: str, update: str) -> None:
-    """Have JSON in the database be as programs without locks and sizes wrote it."""
+_OF_0003 = ("locked", "default_size")
+_OF_0004 = ("hull", "hull_options", "masks", "next_mask_id")
+_LATER = {"0001": (*_OF_0003, *_OF_0004), "0002": (*_OF_0003, *_OF_0004), "0003": _OF_0004}
+"""What databases of a schema do not hold, in columns and JSON."""
+
+
+def _forget_what_is_new(connection: sqlite3.Connection, select: str, update: str, *, later: tuple[str, ...]) -> None:
+    """Have JSON in the database be as older programs wrote it."""
 
     def older(item: dict[str, object]) -> dict[str, object]:
-        return {key: value for key, value in item.items() if key not in ("locked", "default_size")}
+        said = {key: value for key, value in item.items() if key not in later}
+        return {**said, "has_hull": False} if "rotation" in item else said
 
     for text, key in connection.execute(select).fetchall():
         connection.execute(update, (json.dumps(json.loads(text, object_hook=older)), key))

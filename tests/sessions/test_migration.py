@@ -24,7 +24,7 @@ MakeBox = Callable[..., Box]
 MakeOlder = Callable[[Path, str], None]
 
 
-@pytest.fixture(params=["0001", "0002"])
+@pytest.fixture(params=["0001", "0002", "0003"])
 def old(
     request: pytest.FixtureRequest,
     store: SessionStore,
@@ -76,7 +76,7 @@ def test_a_step_that_fails_leaves_the_old_database(
     before, old_schema = dump(path), schema(path)
     scripts = tmp_path / "migrations"
     shutil.copytree(migration.SCRIPTS, scripts, ignore=shutil.ignore_patterns("__pycache__"))
-    step = scripts / "versions" / "0003_locks.py"
+    step = scripts / "versions" / "0004_masks.py"
     step.write_text(step.read_text() + '    op.execute("DELETE FROM edit")\n    op.execute("SELECT * FROM nowhere")\n')
     with pytest.raises(
         StoreError, match=rf"from schema {old_schema} to {migration.SCHEMA} failed and was taken back: .*nowhere"
@@ -93,7 +93,7 @@ def test_a_step_that_leaves_rows_without_what_they_refer_to_fails(
     before = dump(path)
     scripts = tmp_path / "migrations"
     shutil.copytree(migration.SCRIPTS, scripts, ignore=shutil.ignore_patterns("__pycache__"))
-    step = scripts / "versions" / "0003_locks.py"
+    step = scripts / "versions" / "0004_masks.py"
     step.write_text(step.read_text() + '    op.execute("DELETE FROM object_class")\n')
     with pytest.raises(StoreError, match="rows are left without the row they refer to"):
         migration.bring_up_to_date(path, scripts=scripts)
