@@ -1,0 +1,152 @@
+"""What viewing cones share, as a mesh: depths are chosen for the cones, then all are intersected at once."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+from manifold3d import Manifold, OpType
+
+from ars_web.geometry.viewing_cone import ViewingCone
+
+FAR_BASELINES = 100.0
+"""Distances between the two cameras that are furthest apart. What reaches further away has no end that they tell."""
+
+NEAR_FAR = 1e-6
+"""Of the farthest depth: where cones begin that nothing else is known about."""
+
+DEPTH_MARGIN = 0.05
+"""Of its depth, by which a cone is longer than what it must reach."""
+
+OPEN_REACH = 3.0
+"""How much larger than what is seen of it an object may be that goes on beyond the image and that nothing bounds."""
+
+
+@dataclass(frozen=True, eq=False)
+class ConeScene:
+    """Cones, and how far they reach.
+
+    Attributes:
+        ground: z of the world below which nothing is; None for no such plane.
+        near, far: depths, metres before each camera, between which the cones are looked at.
+    """
+
+    cones: Sequence[ViewingCone]
+    ground: float | None
+    near: float
+    far: float
+
+    @staticmethod
+    def of(cones: Sequence[ViewingCone], ground: float | None) -> "ConeScene":
+        """Two cones or more from different places, as far as these can tell depths."""
+        centres = np.array([cone.centre_world for cone in cones])
+        far = FAR_BASELINES * float(np.linalg.norm(centres[:, None] - centres[None], axis=-1).max())
+        return ConeScene(cones, ground, NEAR_FAR * far, far)
+
+    @staticmethod
+    def within(cones: Sequence[ViewingCone], ground: float | None, near: float, far: float) -> "ConeScene":
+        """One cone or more between two depths."""
+        return ConeScene(cones, ground, near, far)
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A closed mesh in the world, and whether a cone's far end cut it off."""
+
+    vertices: Float[np.ndarray, "v 3"]
+    faces: Int[np.ndarray, "f 3"]
+    reaches_far: bool
+
+
+def intersection(scene: ConeScene) -> Solid | None:
+    """What all cones share above the ground; None where they share nothing.
+
+    Cones as long as the scene would be needles: from the frames round the masks, which have four sides each, follows
+    between which depths every camera can have the object at most, and the cones are made for these.
+    """
+    closed = [cone for cone in scene.cones if not cone.is_open]
+    origin = np.mean([cone.centre_world for cone in scene.cones], axis=0)
+    rough = [_frame_solid(cone, scene, origin) for cone in closed]
+    cap = None
+    bounds = _trimmed(rough, scene, origin)
+    if len(closed) < len(scene.cones) and (not closed or bounds is None or _reaches_far(closed, bounds, scene)):
+        seen = _trimmed([_frame_solid(cone, scene, origin) for cone in scene.cones], scene, origin)
+        if seen is None:
+            return None
+        low, high = seen.min(axis=0), seen.max(axis=0)
+        more = (high - low) * (OPEN_REACH - 1) / 2
+        cap = (low - more, high + more)
+        bounds = _trimmed([*rough, _cuboid(cap, origin)], scene, origin)
+    if bounds is None:
+        return None
+    middle = (bounds.min(axis=0) + bounds.max(axis=0)) / 2
+    solids = [] if cap is None else [_cuboid(cap, middle)]
+    for cone in closed:
+        near, far = _depth_range(cone, bounds, scene)
+        solids.append(cone.solid(cone.rings, near=near, far=far, origin=middle))
+    hull = Manifold.batch_boolean(solids, OpType.Intersect)
+    if scene.ground is not None:
+        hull = hull.trim_by_plane((0.0, 0.0, 1.0), scene.ground - middle[2])
+    hull = _beside_backgrounds(hull, scene, bounds, middle)
+    if hull.is_empty() or not hull.volume() > 0:
+        return None
+    mesh = hull.to_mesh64()
+    vertices = np.asarray(mesh.vert_properties)[:, :3] + middle
+    return Solid(vertices, np.asarray(mesh.tri_verts).astype(np.int64), _reaches_far(closed, vertices, scene))
+
+
+def _beside_backgrounds(
+    hull: Manifold, scene: ConeScene, bounds: Float[np.ndarray, "n 3"], origin: Float[np.ndarray, "3"]
+) -> Manifold:
+    """A hull without what cameras with open cones see beside their masks, and without the pieces that none of these
+    masks shows anything of: an object is one thing, and is seen."""
+    opened = [cone for cone in scene.cones if cone.is_open]
+    if not opened:
+        return hull
+    taken: list[Manifold] = []
+    for cone in opened:
+        far = max(float(cone.depths(bounds).max()), 0.0) * (1 + DEPTH_MARGIN)
+        if cone.background and far > scene.near:
+            taken.append(cone.solid(cone.background, near=scene.near, far=far, origin=origin))
+    hull = Manifold.batch_boolean([hull, *taken], OpType.Subtract)
+    pieces = hull.decompose()
+    for cone in opened:
+        far = max(float(cone.depths(bounds).max()), 0.0) * (1 + DEPTH_MARGIN)
+        if far <= scene.near:
+            return Manifold()
+        shown = cone.solid(cone.rings, near=scene.near, far=far, origin=origin)
+        pieces = [piece for piece in pieces if not (piece ^ shown).is_empty()]
+    return Manifold.batch_boolean(pieces, OpType.Add) if pieces else Manifold()
+
+
+def _frame_solid(cone: ViewingCone, scene: ConeScene, origin: Float[np.ndarray, "3"]) -> Manifold:
+    return cone.solid(cone.frame_of_rings, near=scene.near, far=scene.far, origin=origin)
+
+
+def _trimmed(
+    solids: Sequence[Manifold], scene: ConeScene, origin: Float[np.ndarray, "3"]
+) -> Float[np.ndarray, "v 3"] | None:
+    """The corners in the world of what solids share above the ground; None where they share nothing."""
+    if not solids:
+        return None
+    shared = Manifold.batch_boolean(list(solids), OpType.Intersect)
+    if scene.ground is not None:
+        shared = shared.trim_by_plane((0.0, 0.0, 1.0), scene.ground - origin[2])
+    if shared.is_empty():
+        return None
+    return np.asarray(shared.to_mesh64().vert_properties)[:, :3] + origin
+
+
+def _cuboid(bounds: tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]], origin: Float[np.ndarray, "3"]) -> Manifold:
+    low, high = bounds
+    return Manifold.cube(high - low).translate(low - origin)
+
+
+def _depth_range(cone: ViewingCone, bounds: Float[np.ndarray, "n 3"], scene: ConeScene) -> tuple[float, float]:
+    depths = cone.depths(bounds)
+    near = max(float(depths.min()) * (1 - DEPTH_MARGIN), scene.near)
+    return near, max(min(float(depths.max()) * (1 + DEPTH_MARGIN), scene.far), near * (1 + DEPTH_MARGIN))
+
+
+def _reaches_far(cones: Sequence[ViewingCone], points_world: Float[np.ndarray, "n 3"], scene: ConeScene) -> bool:
+    return any(float(cone.depths(points_world).max()) > 0.99 * scene.far for cone in cones)
