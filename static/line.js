@@ -52,7 +52,7 @@ async function load() {
     store.boxes.value = new Map(boxes.map((box) => [box.id, box]));
     store.classes.value = new Map(classes.map((one) => [one.id, one]));
     store.revision.value = session.revision;
-    if (!store.boxes.value.has(store.selected.value ?? -1)) store.selected.value = null;
+    if (!store.isObject(store.selected.value ?? -1)) store.selected.value = null;
   });
 }
 
@@ -165,7 +165,7 @@ function sendView() {
     type: "view",
     mode: store.mode.value === "frame" ? "frame" : "scene",
     frame: store.frame.value,
-    selected: store.selected.value,
+    selected: store.selected.value === store.NEW ? null : store.selected.value,
     tool: store.tool.value === "points" ? "select" : store.tool.value,
     axes: store.axes.value,
     snap_length: store.snapLength.value,
@@ -239,16 +239,19 @@ function takeDrag(message) {
 function takeEdit(edit) {
   const boxes = new Map(store.boxes.value);
   const classes = new Map(store.classes.value);
+  const masks = new Map(store.masks.value);
   for (const change of edit.changes) {
     if (change.kind === "box") put(boxes, edit.revision, /** @type {Box | null} */ (change.after), /** @type {number} */ (change.id));
     else if (change.kind === "class") put(classes, edit.revision, /** @type {ObjectClass | null} */ (change.after), /** @type {number} */ (change.id));
+    else if (change.kind === "mask") put(masks, edit.revision, /** @type {import("./store.js").Mask | null} */ (change.after), /** @type {number} */ (change.id));
     else if (store.session.value !== null) store.session.value = { ...store.session.value, name: String(change.after) };
   }
   store.boxes.value = boxes;
   store.classes.value = classes;
+  store.masks.value = masks;
   store.revision.value = Math.max(store.revision.value, edit.revision);
   store.latestEdit.value = edit;
-  if (store.selected.value !== null && !boxes.has(store.selected.value)) store.selected.value = null;
+  if (store.selected.value !== null && !store.isObject(store.selected.value)) store.selected.value = null;
 }
 
 /**

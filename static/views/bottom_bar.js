@@ -17,7 +17,7 @@ export function BottomBar({ marks }) {
   const aspect = useAspect();
   return html`<footer class="frames-bar" aria-label="Frames">
     <${Scrubber} marks=${marks} shown=${shown} aspect=${aspect} />
-    <${FilmStrip} shown=${shown} aspect=${aspect} />
+    <${FilmStrip} marks=${marks} shown=${shown} aspect=${aspect} />
   </footer>`;
 }
 

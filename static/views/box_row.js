@@ -31,12 +31,7 @@ export function BoxRow({ id, box, index, offset, visitors = [], renaming, onRena
     <span class="name" role="gridcell">
       ${renaming ? html`<${RenameField} box=${box} onDone=${() => onRename(false)} />` : html`<span class="cut" title=${box.name}>${box.name}</span>`}
     </span>
-    ${visitors.length > 0 && html`<span class="visitors" role="gridcell">${visitors.slice(0, 3).map(
-      (person) => html`<span
-        class="visitor" key=${person.view} style=${{ background: personColor(person.view) }} role="img"
-        aria-label=${`Selected by ${person.name || "someone"}`} title=${`Selected by ${person.name || "someone"}`}
-      >${initials(person.name)}</span>`,
-    )}</span>`}
+    <${Visitors} visitors=${visitors} />
     <span class="size muted" role="gridcell">${sizeText(box.size)}</span>
     <span class="lock-cell" role="gridcell">
       <${RowButton} class="lock" icon=${box.locked ? "lock" : "lock-open"} pressed=${box.locked} label=${`Lock ${box.name}`}
@@ -47,6 +42,34 @@ export function BoxRow({ id, box, index, offset, visitors = [], renaming, onRena
         title=${isHidden ? "Show on this page (H)" : "Hide on this page (H)"} run=${() => toggleHidden(box.id)} />
     </span>
   </div>`;
+}
+
+/**
+ * An object that is being outlined and has no box yet.
+ * @param {{id: string, draft: import("../store.js").Draft & {name: string}, index: number, offset: number, visitors?: import("../store.js").Person[]}} props
+ */
+export function DraftRow({ id, draft, index, offset, visitors = [] }) {
+  const colour = store.classes.value.get(draft.class_id)?.color;
+  return html`<div
+    class="box-row" role="row" id=${id} data-box=${draft.id} aria-selected=${store.selected.value === draft.id} aria-rowindex=${index + 1}
+    style=${{ top: `${offset}px` }} title="It is being outlined, and has no box yet" onClick=${() => store.actions.select(draft.id)}
+  >
+    <span class="swatch" style=${{ background: colour }} role="presentation"></span>
+    <span class="name" role="gridcell"><span class="cut">${draft.name}</span></span>
+    <${Visitors} visitors=${visitors} />
+    <span class="size muted" role="gridcell">new</span>
+  </div>`;
+}
+
+/** @param {{visitors: import("../store.js").Person[]}} props */
+function Visitors({ visitors }) {
+  if (visitors.length === 0) return null;
+  return html`<span class="visitors" role="gridcell">${visitors.slice(0, 3).map(
+    (person) => html`<span
+      class="visitor" key=${person.view} style=${{ background: personColor(person.view) }} role="img"
+      aria-label=${`Selected by ${person.name || "someone"}`} title=${`Selected by ${person.name || "someone"}`}
+    >${initials(person.name)}</span>`,
+  )}</span>`;
 }
 
 /**

@@ -5,10 +5,11 @@ import { Menu } from "../lib/menu.js";
 import { computed, html, useEffect, useLayoutEffect, useRef, useSignal } from "../lib/view.js";
 import * as store from "../store.js";
 import { boxMenu, classMenu } from "./box_menu.js";
-import { BoxRow } from "./box_row.js";
+import { BoxRow, DraftRow } from "./box_row.js";
 import { NoBoxes } from "./new_box.js";
 
 /** @typedef {import("../store.js").Box} Box */
+/** An object in the list; `box` null: it is not made yet. @typedef {{id: number, class_id: number, name: string, box: Box | null}} Row */
 
 /** Pixels, as in side_panel.css. */
 const ROW = 30;
@@ -17,7 +18,16 @@ const SPARE = 6;
 /** Above so many boxes, one looks for them by name. */
 const MANY = 12;
 
-const ordered = computed(() => [...store.shownBoxes.value.values()].sort((a, b) => a.id - b.id));
+/** The boxes, and after them the objects that are being outlined. @type {import("../lib/view.js").ReadonlySignal<Row[]>} */
+const ordered = computed(() => {
+  const boxes = [...store.shownBoxes.value.values()].sort((a, b) => a.id - b.id);
+  const unmade = [...store.drafts.value];
+  if (store.selected.value === store.NEW && store.newClass.value !== null) unmade.push({ id: store.NEW, class_id: store.newClass.value });
+  return [
+    ...boxes.map((box) => ({ id: box.id, class_id: box.class_id, name: box.name, box })),
+    ...unmade.map(({ id, class_id }) => ({ id, class_id, name: store.classes.value.get(class_id)?.name ?? "object", box: null })),
+  ];
+});
 /** Who else has a box selected, by its id. */
 const visitors = computed(() => {
   /** @type {Map<number, import("../store.js").Person[]>} */
@@ -35,7 +45,7 @@ export function BoxesList() {
   const problem = store.problems.value.get("boxes");
   const many = all.length > MANY;
   const wanted = filter.value.trim().toLowerCase();
-  const rows = many && wanted !== "" ? all.filter((box) => matches(box, wanted)) : all;
+  const rows = many && wanted !== "" ? all.filter((row) => matches(row, wanted)) : all;
   return html`<section class="panel-section boxes" aria-label="Boxes">
     ${problem !== undefined &&
     html`<p class="problem dismissible" role="alert">${problem}
@@ -53,20 +63,20 @@ export function BoxesList() {
   </section>`;
 }
 
-/** @param {Box} box @param {string} wanted lower case */
-function matches(box, wanted) {
-  const className = store.classes.value.get(box.class_id)?.name ?? "";
-  return box.name.toLowerCase().includes(wanted) || className.toLowerCase().includes(wanted);
+/** @param {Row} row @param {string} wanted lower case */
+function matches(row, wanted) {
+  const className = store.classes.value.get(row.class_id)?.name ?? "";
+  return row.name.toLowerCase().includes(wanted) || className.toLowerCase().includes(wanted);
 }
 
-/** @param {{rows: Box[]}} props */
+/** @param {{rows: Row[]}} props */
 function Rows({ rows }) {
   const list = useRef(/** @type {HTMLElement | null} */ (null));
   const top = useSignal(0);
   const height = useSignal(0);
   const renaming = useSignal(/** @type {number | null} */ (null));
   const menu = useSignal(/** @type {{id: number, x: number, y: number, of: "box" | "class"} | null} */ (null));
-  const at = rows.findIndex((box) => box.id === store.selected.value);
+  const at = rows.findIndex((row) => row.id === store.selected.value);
 
   useLayoutEffect(() => {
     const element = /** @type {HTMLElement} */ (list.current);
@@ -98,7 +108,7 @@ function Rows({ rows }) {
       event.preventDefault();
       event.stopPropagation();
       if (to !== at) select(to);
-    } else if (event.key === "F2" && at >= 0) {
+    } else if (event.key === "F2" && at >= 0 && rows[at].box !== null) {
       event.preventDefault();
       renaming.value = rows[at].id;
     } else if (event.key === "Enter" && at >= 0) {
@@ -109,8 +119,8 @@ function Rows({ rows }) {
   /** @param {MouseEvent} event */
   const openMenu = (event) => {
     const row = /** @type {HTMLElement} */ (event.target).closest("[data-box]");
-    const box = row === null ? rows[at] : rows.find((one) => one.id === Number(row.getAttribute("data-box")));
-    if (box === undefined) return;
+    const box = (row === null ? rows[at] : rows.find((one) => one.id === Number(row.getAttribute("data-box"))))?.box;
+    if (box === undefined || box === null) return;
     event.preventDefault();
     store.actions.select(box.id);
     // The menu key says no place, or that of the whole list.
@@ -130,11 +140,11 @@ function Rows({ rows }) {
     >
       <div class="rows" role="presentation" style=${{ height: `${rows.length * ROW}px` }}>
         ${rows.slice(first, last).map(
-          (box, i) => html`<${BoxRow}
-            key=${box.id} id=${rowId(box.id)} box=${box} index=${first + i} offset=${(first + i) * ROW}
-            visitors=${visitors.value.get(box.id)} renaming=${renaming.value === box.id}
+          (row, i) => html`<${row.box === null ? DraftRow : BoxRow}
+            key=${row.id} id=${rowId(row.id)} box=${row.box} draft=${row} index=${first + i} offset=${(first + i) * ROW}
+            visitors=${visitors.value.get(row.id)} renaming=${renaming.value === row.id}
             onRename=${(/** @type {boolean} */ begin) => {
-              renaming.value = begin ? box.id : null;
+              renaming.value = begin ? row.id : null;
               if (!begin) list.current?.focus();
             }}
           />`,

@@ -21,10 +21,11 @@ const NOTCH = 40;
 
 /**
  * @param {object} props
+ * @param {import("../lib/view.js").ReadonlySignal<readonly import("./scrubber.js").Mark[]>} [props.marks] frames worth pointing at
  * @param {import("../lib/view.js").Signal<{first: number, last: number} | null>} props.shown told which frames are in sight
  * @param {number} props.aspect width by height of the images
  */
-export function FilmStrip({ shown, aspect }) {
+export function FilmStrip({ marks, shown, aspect }) {
   const strip = useRef(/** @type {HTMLDivElement | null} */ (null));
   const place = useScrollPlace(strip);
   const count = frames.value;
@@ -128,6 +129,7 @@ export function FilmStrip({ shown, aspect }) {
   };
 
   const at = steps.indexOf(step);
+  const marked = new Map((marks?.value ?? []).map((mark) => [Math.floor(mark.frame / step), mark]));
   const frameOf = (/** @type {number} */ slot) => (slot === slotNow ? current : slot * step);
   return html`<div class="film-strip">
     <div
@@ -147,6 +149,7 @@ export function FilmStrip({ shown, aspect }) {
             >
               <${FrameImage} index=${frameOf(slot)} width=${width} wanted=${place.resting} />
               <span class="index">${frameOf(slot)}</span>
+              ${marked.has(slot) && html`<span class="mark" data-faint=${marked.get(slot)?.faint ?? false} title=${marked.get(slot)?.title} style=${{ background: marked.get(slot)?.color }} />`}
             </div>`,
         )}
       </div>

@@ -12,7 +12,7 @@ const TICK_GAP = 9;
 const REST = 80;
 const PREVIEW_WIDTH = 176;
 
-/** @typedef {{frame: number, color: string, title: string}} Mark */
+/** `faint`: it is not sure yet. @typedef {{frame: number, color: string, title: string, faint?: boolean}} Mark */
 
 /**
  * @param {object} props
@@ -83,7 +83,7 @@ export function Scrubber({ marks, shown, aspect }) {
       html`<span class="span" style=${{ left: `${(span.first / count) * 100}%`, width: `${((span.last + 1 - span.first) / count) * 100}%` }} />`}
       ${(marks?.value ?? []).map(
         (mark) =>
-          html`<span key=${`m${mark.frame}`} class="mark" title=${mark.title} style=${{ left: place(mark.frame), background: mark.color }} />`,
+          html`<span key=${`m${mark.frame}`} class="mark" data-faint=${mark.faint ?? false} title=${mark.title} style=${{ left: place(mark.frame), background: mark.color }} />`,
       )}
       ${others.map(
         (person) =>

@@ -5,6 +5,7 @@ import * as store from "../store.js";
 import { BottomBar } from "./bottom_bar.js";
 import { ContactSheet } from "./contact_sheet.js";
 import { Help } from "./help.js";
+import { maskMarks } from "./mask_marks.js";
 import { Palette } from "./palette.js";
 import { SidePanel } from "./side_panel.js";
 import { Stage } from "./stage.js";
@@ -19,7 +20,7 @@ export function Workspace({ view }) {
       <${ToolRail} />
       <${Stage} view=${view} />
       <aside class="side-panel" aria-label="Boxes and numbers"><${SidePanel} /></aside>
-      <div class="bottom-bar"><${BottomBar} /></div>
+      <div class="bottom-bar"><${BottomBar} marks=${maskMarks} /></div>
     </div>
     ${store.overlay.value === "help" && html`<${Help} />`}
     ${store.overlay.value === "palette" && html`<${Palette} />`}
