@@ -34,6 +34,11 @@ class LensTables:
     lens: Lens
     bends: Float[np.ndarray, "3 bins"]
 
+    def bends_within(self, radii: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
+        """Bounds on the second derivative of a straight line's image in any direction, for lines within these radii."""
+        place = BINS + np.log(np.maximum(radii, 1e-30) / self.lens.rim) * self.lens.bins_per_e
+        return self.bends[2, np.clip(np.floor(place), 0, BINS - 1).astype(np.int64)]
+
 
 @lru_cache(maxsize=64)
 def lens_tables(camera: Camera) -> LensTables:

@@ -436,11 +436,25 @@ def rings_of_shadows(
 
 
 @entry
+def bend_points(lens: Lens, x: Array, y: Array, u: Array, v: Array) -> None:
+    """Image coordinates of points of the normalised plane (n, m) within the rim, written to `u` and `v` (n, m)."""
+    # Two loops, as in `sample`.
+    for i in range(len(x)):
+        if lens.fisheye:
+            for j in range(x.shape[1]):
+                u[i, j], v[i, j] = fisheye_point(lens, x[i, j], y[i, j])
+        else:
+            for j in range(x.shape[1]):
+                u[i, j], v[i, j] = brown_point(lens, x[i, j], y[i, j])
+
+
+@entry
 def curves_of_edges(lens: Lens, bends: Array, edges: Array, tolerance: float) -> tuple[Array, Array]:
     """Images of straight pieces (n, 2, 2), cut to the rim: all points (k, 2), and (n,) how many each has, 0 for those
     beyond the rim."""
-    bend = polygon_bend(lens, bends, 0, edges.reshape((-1, 2)), 2 * len(edges))
-    found = np.empty((CAPACITY, 2))
+    # A copy, because threads that count the users of one array stand in each other's way.
+    bends = bends.copy()
+    found = np.empty((4 * len(edges) + LONGEST_CURVE + 2, 2))
     lengths = np.zeros(len(edges), np.int64)
     k = 0
     for i in range(len(edges)):
@@ -448,7 +462,12 @@ def curves_of_edges(lens: Lens, bends: Array, edges: Array, tolerance: float) ->
         low, high = within_rim(lens, x0, y0, x1, y1)
         if low > high:
             continue
+        if k + LONGEST_CURVE + 2 > len(found):
+            grown = np.empty((2 * len(found) + LONGEST_CURVE, 2))
+            grown[:k] = found[:k]
+            found = grown
         xs, ys, xe, ye = x0 + low * (x1 - x0), y0 + low * (y1 - y0), x0 + high * (x1 - x0), y0 + high * (y1 - y0)
+        bend = polygon_bend(lens, bends, 0, edges[i], 2)
         found[k, 0], found[k, 1] = image_point(lens, xs, ys)
         end = append_curve(lens, bends, bend, xs, ys, xe, ye, tolerance, found, k + 1)
         lengths[i] = end - k

@@ -8,10 +8,13 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+import shapely
+import trimesh
 
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box
 from ars_web.geometry.camera import Camera
+from ars_web.geometry.mesh import Mesh
 
 Scene = tuple[Camera, np.ndarray, Box]
 
@@ -26,6 +29,40 @@ def oracle() -> ModuleType:
     sys.modules[spec.name] = module
     spec.loader.exec_module(module)
     return module
+
+
+@pytest.fixture(scope="session")
+def mesh_oracle() -> ModuleType:
+    """`mesh_oracle.py`, the slow readable version of the labels of meshes."""
+    spec = importlib.util.spec_from_file_location("mesh_oracle", Path(__file__).parent / "mesh_oracle.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="session")
+def solids() -> dict[str, Mesh]:
+    """Closed meshes about the origin, a unit across: convex, bent, with a tunnel, in two pieces, and hollow."""
+    ell = shapely.Polygon([(0, 0), (1, 0), (1, 0.3), (0.3, 0.3), (0.3, 1), (0, 1)])
+    hollow = trimesh.creation.box((0.9, 0.9, 0.9))
+    hollow.invert()
+    shapes = {
+        "ball": trimesh.creation.icosphere(2, 0.5),
+        "torus": trimesh.creation.torus(0.37, 0.13, major_sections=20, minor_sections=10),
+        "L": trimesh.creation.extrude_polygon(ell, 0.4),
+        "can": trimesh.creation.cylinder(0.4, 1.0, sections=24),
+        "two": trimesh.util.concatenate(
+            [trimesh.creation.box((0.3, 0.3, 0.3)), trimesh.creation.icosphere(1, 0.3).apply_translation([0.7, 0.1, 0])]
+        ),
+        "hollow": trimesh.util.concatenate([trimesh.creation.box((1.0, 1.0, 1.0)), hollow]),
+    }
+    return {
+        name: Mesh(np.array(shape.vertices) - shape.bounds.mean(axis=0), np.array(shape.faces))
+        for name, shape in shapes.items()
+    }
 
 
 def random_camera(random: np.random.Generator) -> Camera:
