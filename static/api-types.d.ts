@@ -916,6 +916,8 @@ export interface components {
              * @description whether a visual hull is stored with it
              */
             has_hull: boolean;
+            /** @description how it was made from its masks; null: it was not */
+            hull_options: components["schemas"]["HullOptionsJson"] | null;
             /**
              * Locked
              * @description class, place and size stay, and it is not deleted, until it is unlocked
@@ -957,6 +959,8 @@ export interface components {
              * @description whether a visual hull is stored with it
              */
             has_hull: boolean;
+            /** @description how it was made from its masks; null: it was not */
+            hull_options: components["schemas"]["HullOptionsJson"] | null;
             /**
              * Locked
              * @description class, place and size stay, and it is not deleted, until it is unlocked
@@ -1235,7 +1239,7 @@ export interface components {
             at: string;
             /**
              * Changes
-             * @description each {kind: box | class | name, id, before, after}; before null: added, after null: deleted
+             * @description each {kind: box | class | mask | name, id, before, after}; before null: added, after null: deleted. A mask's before is without its polygons and points
              */
             changes: {
                 [key: string]: unknown;
@@ -1635,6 +1639,34 @@ export interface components {
             can_undo: components["schemas"]["EditName"] | null;
             /** @description the undo that the caller's redo would take back */
             can_redo: components["schemas"]["EditName"] | null;
+        };
+        /**
+         * HullOptionsJson
+         * @description How a box and its hull were made from masks.
+         */
+        HullOptionsJson: {
+            /**
+             * Orientation
+             * @description world: axes as the world's; upright: turned about its z; free
+             * @enum {string}
+             */
+            orientation: "world" | "upright" | "free";
+            /**
+             * Position
+             * @description what the box's centre is: its own, or the hull's centre of mass
+             * @enum {string}
+             */
+            position: "box" | "mass";
+            /**
+             * Widen Px
+             * @description pixels that every mask is widened by
+             */
+            widen_px: number;
+            /**
+             * Ground
+             * @description z in the world, metres, of a support plane under the object; null: none
+             */
+            ground: number | null;
         };
         /**
          * ImageCounts
@@ -2057,7 +2089,7 @@ export interface components {
             at: string;
             /**
              * Changes
-             * @description each {kind: box | class | name, id, before, after}; before null: added, after null: deleted
+             * @description each {kind: box | class | mask | name, id, before, after}; before null: added, after null: deleted. A mask's before is without its polygons and points
              */
             changes: {
                 [key: string]: unknown;
@@ -2976,6 +3008,52 @@ export interface components {
             hidden: number[];
             /** Dark */
             dark: boolean;
+        };
+        /**
+         * ViewMisfit
+         * @description One of the views that do not fit together.
+         */
+        ViewMisfit: {
+            /** Frame */
+            frame: number;
+            /**
+             * Misfit Px
+             * @description by how much its outline would have to grow to meet the others, pixels; null: no growing helps
+             */
+            misfit_px: number | null;
+        };
+        /**
+         * ViewsProblem
+         * @description The same, or outlines that no one object can have: `views` is there where the type is `views-disagree`.
+         */
+        ViewsProblem: {
+            /**
+             * Type
+             * @description which kind of problem, stable: `urn:ars-web:problem:...`
+             */
+            type: string;
+            /**
+             * Title
+             * @description the kind in words
+             */
+            title: string;
+            /**
+             * Status
+             * @description the HTTP status
+             */
+            status: number;
+            /**
+             * Detail
+             * @description what is wrong with this request, and what to do
+             */
+            detail: string;
+            /** Errors */
+            errors?: components["schemas"]["FieldProblem"][];
+            /**
+             * Views
+             * @description those concerned, the worst first
+             */
+            views?: components["schemas"]["ViewMisfit"][];
         };
     };
     responses: never;

@@ -20,10 +20,11 @@ from ars_web.datasets.samples import FrameLabel
 from ars_web.geometry.camera import Camera
 from ars_web.geometry.rigid_transform import wxyz_from_rotation
 from ars_web.recordings.registry import READERS
-from ars_web.sessions.boxes_json import Id, Size, box_json, class_json
-from ars_web.sessions.edits import BoxChange, Change, ClassChange, Edit
+from ars_web.sessions.boxes_json import HullOptionsJson, Id, Size, box_json, class_json
+from ars_web.sessions.edits import BoxChange, Change, ClassChange, Edit, MaskChange
 from ars_web.sessions.history import History
-from ars_web.sessions.model import FrameTable, ObjectClass, SessionSummary, VirtualBox
+from ars_web.sessions.mask_json import mask_json, mask_json_without_outline
+from ars_web.sessions.model import FrameTable, Mask, ObjectClass, SessionSummary, VirtualBox
 from ars_web.sessions.names import LONGEST_NAME
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
@@ -164,6 +165,7 @@ class BoxAnswer(BaseModel):
     T_world_box: TransformAnswer = Field(description="the box's centre and axes in the world")
     size: tuple[float, float, float] = Field(description="metres along the box's own axes")
     has_hull: bool = Field(description="whether a visual hull is stored with it")
+    hull_options: HullOptionsJson | None = Field(description="how it was made from its masks; null: it was not")
     locked: bool = Field(description="class, place and size stay, and it is not deleted, until it is unlocked")
     revision: int = Field(description="the session's revision that last changed it")
 
@@ -268,7 +270,8 @@ class EditJson(BaseModel):
     redoes: int | None
     at: datetime
     changes: list[dict[str, Any]] = Field(
-        description="each {kind: box | class | name, id, before, after}; before null: added, after null: deleted"
+        description="each {kind: box | class | mask | name, id, before, after}; before null: added, after null:"
+        " deleted. A mask's before is without its polygons and points"
     )
 
     @classmethod
@@ -400,6 +403,8 @@ def current_json(current: object) -> Mapping[str, Any] | None:
         return box_json(current)
     if isinstance(current, ObjectClass):
         return class_json(current)
+    if isinstance(current, Mask):
+        return mask_json(current)
     if isinstance(current, SessionSummary):
         return SessionJson.of(current).model_dump(mode="json")
     assert current is None, current
@@ -413,4 +418,8 @@ def _change_json(change: Change) -> dict[str, Any]:
     if isinstance(change, ClassChange):
         before, after = current_json(change.before), current_json(change.after)
         return {"kind": "class", "id": change.class_id, "before": before, "after": after}
+    if isinstance(change, MaskChange):
+        # What it was is told apart by null alone; its outline, of thousands of corners, would double the message.
+        before = None if change.before is None else mask_json_without_outline(change.before)
+        return {"kind": "mask", "id": change.mask_id, "before": before, "after": current_json(change.after)}
     return {"kind": "name", "id": None, "before": change.before, "after": change.after}

@@ -9,10 +9,11 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError,
 
 from ars_web.errors import BadFile
 from ars_web.geometry import rigid_transform
-from ars_web.geometry.box import LARGEST_SIZE, Box
+from ars_web.geometry.box import FARTHEST, LARGEST_SIZE, Box
 from ars_web.geometry.rigid_transform import Transform
 from ars_web.sessions.drafting import BoxDraft
-from ars_web.sessions.model import ObjectClass, VirtualBox
+from ars_web.sessions.hull_json import options_json
+from ars_web.sessions.model import WIDEST, ObjectClass, Orientation, Position, VirtualBox
 from ars_web.sessions.names import LONGEST_NAME
 from ars_web.sessions.strict_json import first_fault, place_text, strict_json
 
@@ -75,11 +76,26 @@ class BoxPatchJson(_Strict):
     locked: Flag | None = None
 
 
+class HullOptionsJson(_Strict):
+    """How a box and its hull were made from masks."""
+
+    orientation: Orientation = Field(description="world: axes as the world's; upright: turned about its z; free")
+    position: Position = Field(description="what the box's centre is: its own, or the hull's centre of mass")
+    widen_px: Annotated[float, Field(strict=True, ge=0.0, le=WIDEST)] = Field(
+        description="pixels that every mask is widened by"
+    )
+    ground: Annotated[float, Field(strict=True, ge=-FARTHEST, le=FARTHEST)] | None = Field(
+        description="z in the world, metres, of a support plane under the object; null: none"
+    )
+
+
 class BoxFileItem(BoxJson):
-    """A box in a file: what `GET …/boxes` answers, of which `id`, `has_hull` and `revision` are not taken over."""
+    """A box in a file: what `GET …/boxes` answers, of which `id`, `has_hull`, `hull_options` and `revision` are not
+    taken over: its hull and masks are not in the file."""
 
     id: Id | None = None
     has_hull: bool | None = None
+    hull_options: HullOptionsJson | None = None
     revision: Id | None = None
 
 
@@ -103,6 +119,7 @@ def box_json(box: VirtualBox) -> dict[str, Any]:
         "T_world_box": transform_json(box.box.T_world_box),
         "size": box.box.size.tolist(),
         "has_hull": box.has_hull,
+        "hull_options": None if box.hull_options is None else options_json(box.hull_options),
         "locked": box.locked,
         "revision": box.revision,
     }

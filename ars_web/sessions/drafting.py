@@ -36,12 +36,17 @@ ClassSize = tuple[float, float, float]
 
 @dataclass(frozen=True, eq=False)
 class BoxDraft:
-    """A box that is to be added; without a name it is called after its class."""
+    """A box that is to be added; without a name it is called after its class.
+
+    Attributes:
+        hull: the digest of one that the session has.
+    """
 
     class_id: int
     box: Box
     name: str | None = None
     locked: bool = False
+    hull: str | None = None
 
 
 def drafted_box(state: SessionState, draft: BoxDraft) -> VirtualBox:
@@ -69,7 +74,9 @@ def _drafted(state: SessionState, draft: BoxDraft, box_id: int, names: FreshName
     a_class = existing_class(state, draft.class_id)
     name = names.give(a_class.name) if draft.name is None else checked_name(draft.name, what="a box")
     names.take(name)
-    return VirtualBox(box_id, a_class.id, name, draft.box, revision=state.revision + 1, locked=draft.locked)
+    return VirtualBox(
+        box_id, a_class.id, name, draft.box, revision=state.revision + 1, locked=draft.locked, hull=draft.hull
+    )
 
 
 def changed_box(
@@ -110,7 +117,7 @@ def changed_box(
 
 
 def refuse_locked(box: VirtualBox, *changes: str) -> None:
-    """Refuse what a lock keeps from being changed: `class`, `place`, `size`, or `existence` for deletion.
+    """Refuse what a lock keeps from being changed: `class`, `place`, `size`, `masks`, or `existence` for deletion.
 
     Raises:
         Locked: the box is locked and there are changes.

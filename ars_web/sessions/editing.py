@@ -1,12 +1,9 @@
-"""The one door for change: appends an edit to the log, applies it and tells listeners, in that order.
+"""All edits of a session; `edit_door.py` says how each is made.
 
-Appending and applying are one transaction, and listeners are told once it is on the disk. Nothing else writes to a
-session. A change that would leave everything as it is makes no edit and no revision.
+A change that would leave everything as it is makes no edit and no revision.
 """
 
-from collections.abc import Callable, Generator, Iterable, Sequence
-from contextlib import contextmanager
-from datetime import UTC, datetime
+from collections.abc import Callable, Iterable, Sequence
 from typing import Literal
 
 import numpy as np
@@ -33,44 +30,32 @@ from ars_web.sessions.drafting import (
     refuse_locked,
 )
 from ars_web.sessions.edit_json import request_digest
-from ars_web.sessions.edits import BoxChange, Change, ClassChange, Edit, NameChange, inverse, restated
+from ars_web.sessions.edits import BoxChange, ClassChange, Edit, MaskChange, NameChange, inverse, restated
 from ars_web.sessions.history import LogEntry, to_redo, to_undo
-from ars_web.sessions.listeners import Listener, Listeners
 from ars_web.sessions.model import ObjectClass, SessionSummary, VirtualBox
-from ars_web.sessions.names import FreshNames, checked_key, checked_name
+from ars_web.sessions.names import FreshNames, checked_name
+from ars_web.sessions.object_drafting import MaskDraft, reclassed
+from ars_web.sessions.object_editing import ObjectEditing, first_box
 from ars_web.sessions.palette import checked_color, next_color
-from ars_web.sessions.store import SessionStore
 from ars_web.sessions.transaction import SessionTransaction
 
-__all__ = ["UNSET", "BoxDraft", "NothingToUndo", "SessionEditor"]
+__all__ = ["UNSET", "BoxDraft", "MaskDraft", "NothingToUndo", "SessionEditor"]
 
 
 class NothingToUndo(BadInput):
     """The author has no edit to take back, or none to make again."""
 
 
-class SessionEditor:
+class SessionEditor(ObjectEditing):
     """Changes sessions, for any number of threads; other processes may change the same sessions meanwhile.
 
     Every method raises NotFound for an unknown session and StoreError where the edit cannot be kept. Methods with
     `expected_revision` raise Conflict where the thing is no longer at that revision; `current` is what it is now.
 
-    A locked box keeps its class, place and size, and is not deleted: Locked says so. It may be renamed and unlocked,
-    also together with other changes, which then count. Undo and redo bring back what was, locks included; a box that
-    someone else locked since is a Conflict for them, as after any other change.
+    A locked box keeps its class, place, size, hull and masks, and is not deleted: Locked says so. It may be renamed
+    and unlocked, also together with other changes, which then count. Undo and redo bring back what was, locks
+    included; a box that someone else locked since is a Conflict for them, as after any other change.
     """
-
-    def __init__(self, store: SessionStore) -> None:
-        self._store = store
-        self._listeners = Listeners()
-
-    def listen(self, callback: Listener) -> Callable[[], None]:
-        """Call `callback(sid, edit)` after each edit made through this editor, in the order of revisions.
-
-        It is called by a thread that edits, and should be quick. Edits of other processes are not told; the log
-        has them (`SessionStore.edits`). Returns the way to stop.
-        """
-        return self._listeners.add(callback)
 
     def add_box(
         self,
@@ -91,33 +76,31 @@ class SessionEditor:
             # Nothing more where it is not locked: keys from before there were locks stay good.
             more = ("locked",) if locked else ()
             digest = request_digest("add box", author, class_id, box.T_world_box, box.size, name, *more)
-            before = None if key is None else session.answered(checked_key(key), digest=digest)
+            before = self._answered(session, key, digest=digest)
             if before is not None:
-                return _first_box(before)
+                return first_box(before)
             added = drafted_box(session.state, BoxDraft(class_id, box, name, locked))
-            edit = self._append(session, _additions([added]), author=author, summary=f"Add {added.name}")
-            if key is not None:
-                session.remember(key, digest=digest)
-        return _first_box(edit)
+            summary = f"Add {added.name}"
+            edit = self._append(session, _additions([added]), author=author, summary=summary, key=key, digest=digest)
+        return first_box(edit)
 
     def duplicate_box(self, sid: str, box_id: int, *, author: str, key: str | None = None) -> VirtualBox:
         """A new box like another, beside it along its own x (see `geometry.box.beside`), called `cube 2` after `cube`.
 
-        It is not locked, also where the other one is. A repeat with the same idempotency `key` returns what the first
-        returned, and adds nothing.
+        It has the other one's hull, no masks, and is not locked, also where the other one is. A repeat with the same
+        idempotency `key` returns what the first returned, and adds nothing.
         """
         with self._editing(sid) as session:
             digest = request_digest("duplicate box", author, box_id)
-            before = None if key is None else session.answered(checked_key(key), digest=digest)
+            before = self._answered(session, key, digest=digest)
             if before is not None:
-                return _first_box(before)
+                return first_box(before)
             original = existing_box(session.state, box_id)
             name = FreshNames(box.name for box in session.state.boxes.values()).give_copy(original.name)
-            added = drafted_box(session.state, BoxDraft(original.class_id, beside(original.box), name))
-            edit = self._append(session, _additions([added]), author=author, summary=f"Duplicate {original.name}")
-            if key is not None:
-                session.remember(key, digest=digest)
-        return _first_box(edit)
+            draft = BoxDraft(original.class_id, beside(original.box), name, hull=original.hull)
+            changes, summary = _additions([drafted_box(session.state, draft)]), f"Duplicate {original.name}"
+            edit = self._append(session, changes, author=author, summary=summary, key=key, digest=digest)
+        return first_box(edit)
 
     def add_boxes(
         self, sid: str, drafts: Sequence[BoxDraft], *, author: str, summary: str = "Import boxes"
@@ -146,7 +129,10 @@ class SessionEditor:
         locked: bool | None = None,
         author: str,
     ) -> VirtualBox:
-        """Change what is given of a box and leave the rest. Nothing new given: the box as it is."""
+        """Change what is given of a box and leave the rest. Nothing new given: the box as it is.
+
+        Its hull moves, turns and scales with it; its masks are of its class.
+        """
         with self._editing(sid) as session:
             before = box_at(session.state, box_id, expected_revision)
             after = changed_box(
@@ -154,9 +140,9 @@ class SessionEditor:
             )
             if after is before:
                 return before
-            self._append(
-                session, (BoxChange(box_id, before, after),), author=author, summary=change_summary(before, after)
-            )
+            masks = reclassed(session.state, session.state.masks_of(box_id), after.class_id)
+            changes = (BoxChange(box_id, before, after), *masks)
+            self._append(session, changes, author=author, summary=change_summary(before, after))
         return after
 
     def rest_on_ground(
@@ -168,26 +154,27 @@ class SessionEditor:
         """
         with self._editing(sid) as session:
             digest = request_digest("rest on ground", author, box_id, expected_revision)
-            answered = None if key is None else session.answered(checked_key(key), digest=digest)
+            answered = self._answered(session, key, digest=digest)
             if answered is not None:
-                return _first_box(answered)
+                return first_box(answered)
             before = box_at(session.state, box_id, expected_revision)
             T = resting_on_ground(before.box).T_world_box
             after = changed_box(session.state, before, class_id=None, T_world_box=T, size=None, name=None, locked=None)
             if after is before:
                 return before
             summary = f"Put {before.name} on the ground"
-            self._append(session, (BoxChange(box_id, before, after),), author=author, summary=summary)
-            if key is not None:
-                session.remember(key, digest=digest)
+            change = BoxChange(box_id, before, after)
+            self._append(session, (change,), author=author, summary=summary, key=key, digest=digest)
         return after
 
     def delete_box(self, sid: str, box_id: int, *, expected_revision: int, author: str) -> None:
-        """Take a box away; undo brings it back with the same id."""
+        """Take a box and its masks away; undo brings them back with the same ids."""
         with self._editing(sid) as session:
             before = box_at(session.state, box_id, expected_revision)
             refuse_locked(before, "existence")
-            self._append(session, (BoxChange(box_id, before, None),), author=author, summary=f"Delete {before.name}")
+            masks = (MaskChange(mask.id, mask, None) for mask in session.state.masks_of(box_id))
+            changes = (BoxChange(box_id, before, None), *masks)
+            self._append(session, changes, author=author, summary=f"Delete {before.name}")
 
     def add_class(
         self,
@@ -207,7 +194,7 @@ class SessionEditor:
             # Nothing more where there is no size: keys from before there were sizes stay good.
             more = () if default_size is None else (default_size,)
             digest = request_digest("add class", author, name, color, *more)
-            before = None if key is None else session.answered(checked_key(key), digest=digest)
+            before = self._answered(session, key, digest=digest)
             if before is not None:
                 return _first_class(before)
             state = session.state
@@ -218,10 +205,8 @@ class SessionEditor:
                 revision=state.revision + 1,
                 default_size=class_size(default_size),
             )
-            change = ClassChange(added.id, None, added)
-            self._append(session, (change,), author=author, summary=f"Add class {added.name}")
-            if key is not None:
-                session.remember(key, digest=digest)
+            change, summary = ClassChange(added.id, None, added), f"Add class {added.name}"
+            self._append(session, (change,), author=author, summary=summary, key=key, digest=digest)
         return added
 
     def change_class(
@@ -252,7 +237,7 @@ class SessionEditor:
         """Take a class away.
 
         Raises:
-            BadInput: boxes use it.
+            BadInput: boxes or masks use it.
         """
         with self._editing(sid) as session:
             before = class_at(session.state, class_id, expected_revision)
@@ -261,6 +246,12 @@ class SessionEditor:
                 raise BadInput(
                     f"class {before.name!r} is used by {len(users)} box(es), such as {users[0]!r};"
                     " delete them or give them another class first"
+                )
+            masks = [mask for mask in session.state.masks.values() if mask.class_id == class_id]
+            if masks:
+                raise BadInput(
+                    f"class {before.name!r} is used by {len(masks)} outline(s), such as that of object"
+                    f" {masks[0].box_id} in frame {masks[0].frame}; delete them first"
                 )
             change = ClassChange(class_id, before, None)
             self._append(session, (change,), author=author, summary=f"Delete class {before.name}")
@@ -302,12 +293,6 @@ class SessionEditor:
         """
         return self._take_turn(sid, "Redo", to_redo, author=author, key=key)
 
-    @contextmanager
-    def _editing(self, sid: str) -> Generator[SessionTransaction]:
-        with self._store.writing(sid, committed=lambda edits: self._listeners.put(sid, edits)) as session:
-            yield session
-        self._listeners.tell()
-
     def _take_turn(
         self,
         sid: str,
@@ -320,7 +305,7 @@ class SessionEditor:
         """Invert the edit whose revision `choose` picks from the author's own, once a key."""
         with self._editing(sid) as session:
             digest = request_digest(verb.lower(), author)
-            before = None if key is None else session.answered(checked_key(key), digest=digest)
+            before = self._answered(session, key, digest=digest)
             if before is not None:
                 return before
             revision = choose(session.newest_entries(author=author))
@@ -347,38 +332,9 @@ class SessionEditor:
             redoes=edit.revision if verb == "Redo" else None,
         )
 
-    def _append(
-        self,
-        session: SessionTransaction,
-        changes: tuple[Change, ...],
-        *,
-        author: str,
-        summary: str,
-        undoes: int | None = None,
-        redoes: int | None = None,
-    ) -> Edit:
-        edit = Edit(
-            revision=session.state.revision + 1,
-            author=checked_name(author, what="an author"),
-            summary=summary,
-            changes=changes,
-            undoes=undoes,
-            redoes=redoes,
-            at=datetime.now(UTC),
-        )
-        session.append(edit)
-        return edit
-
 
 def _additions(boxes: Sequence[VirtualBox]) -> tuple[BoxChange, ...]:
     return tuple(BoxChange(box.id, None, box) for box in boxes)
-
-
-def _first_box(edit: Edit) -> VirtualBox:
-    change = edit.changes[0]
-    assert isinstance(change, BoxChange)
-    assert change.after is not None
-    return change.after
 
 
 def _first_class(edit: Edit) -> ObjectClass:

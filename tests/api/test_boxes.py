@@ -18,7 +18,15 @@ def test_a_box_is_made_changed_and_deleted(client: httpx.Client, path: str, box_
     made = client.post(path, json={**box_json, "name": "left"})
     assert (made.status_code, made.headers["etag"]) == (201, '"1"')
     one = made.headers["location"]
-    assert made.json() == {**box_json, "id": 1, "name": "left", "has_hull": False, "locked": False, "revision": 1}
+    assert made.json() == {
+        **box_json,
+        "id": 1,
+        "name": "left",
+        "has_hull": False,
+        "hull_options": None,
+        "locked": False,
+        "revision": 1,
+    }
     assert client.get(one).json() == made.json()
     assert client.get(one).headers["etag"] == '"1"'
     assert client.get(path).json() == [made.json()]

@@ -23,7 +23,17 @@ GOOD = {"class_id": 0, "T_world_box": {"position": [0, 0.5, 1], "wxyz": [2, 0, 0
 def test_a_box_is_written_as_the_contract_says():
     T = rigid_transform.from_position_wxyz(np.array([1.0, 2.0, 3.0]), np.array([-0.5, 0.5, 0.5, 0.5]))
     written = box_json(VirtualBox(7, 1, "left", Box(T, np.array([0.1, 0.2, 0.3])), 12))
-    assert list(written) == ["id", "class_id", "name", "T_world_box", "size", "has_hull", "locked", "revision"]
+    assert list(written) == [
+        "id",
+        "class_id",
+        "name",
+        "T_world_box",
+        "size",
+        "has_hull",
+        "hull_options",
+        "locked",
+        "revision",
+    ]
     assert written["locked"] is False
     assert written["T_world_box"]["position"] == [1.0, 2.0, 3.0]
     assert written["T_world_box"]["wxyz"] == pytest.approx([0.5, -0.5, -0.5, -0.5])
