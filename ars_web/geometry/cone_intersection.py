@@ -1,5 +1,6 @@
 """What viewing cones share, as a mesh: depths are chosen for the cones, then all are intersected at once."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -8,6 +9,9 @@ from jaxtyping import Float, Int
 from manifold3d import Manifold, OpType
 
 from ars_web.geometry.viewing_cone import ViewingCone
+
+SMALLEST_ANGLE = math.radians(5)
+"""Between two views. Below it, an outline's error of a pixel moves the hull's ends by more than its width."""
 
 FAR_BASELINES = 100.0
 """Distances between the two cameras that are furthest apart. What reaches further away has no end that they tell."""
@@ -36,11 +40,15 @@ class ConeScene:
     near: float
     far: float
 
+    @property
+    def tellable(self) -> float:
+        """The depth at which the two cameras that are furthest apart see a point from sides SMALLEST_ANGLE apart."""
+        return _widest_baseline(self.cones) / SMALLEST_ANGLE
+
     @staticmethod
     def of(cones: Sequence[ViewingCone], ground: float | None) -> "ConeScene":
         """Two cones or more from different places, as far as these can tell depths."""
-        centres = np.array([cone.centre_world for cone in cones])
-        far = FAR_BASELINES * float(np.linalg.norm(centres[:, None] - centres[None], axis=-1).max())
+        far = FAR_BASELINES * _widest_baseline(cones)
         return ConeScene(cones, ground, NEAR_FAR * far, far)
 
     @staticmethod
@@ -93,6 +101,11 @@ def intersection(scene: ConeScene) -> Solid | None:
     mesh = hull.to_mesh64()
     vertices = np.asarray(mesh.vert_properties)[:, :3] + middle
     return Solid(vertices, np.asarray(mesh.tri_verts).astype(np.int64), _reaches_far(closed, vertices, scene))
+
+
+def _widest_baseline(cones: Sequence[ViewingCone]) -> float:
+    centres = np.array([cone.centre_world for cone in cones])
+    return float(np.linalg.norm(centres[:, None] - centres[None], axis=-1).max())
 
 
 def _beside_backgrounds(

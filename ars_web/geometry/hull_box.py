@@ -4,7 +4,8 @@ from typing import Literal
 
 import numpy as np
 import shapely
-from jaxtyping import Float
+from jaxtyping import Bool, Float
+from manifold3d import Manifold
 
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box
@@ -82,37 +83,70 @@ def _turns() -> list[Float[np.ndarray, "3 3"]]:
 
 _TURNS = _turns()
 
+_AXES_FIRST = [np.eye(3)[:, order] for order in ((0, 1, 2), (1, 2, 0), (2, 0, 1))]
+"""Turns after which z is what z, x and y were."""
+
 
 def _smallest_box_rotation(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "3 3"]:
     """Each face of the convex hull as a side of the box, with the smallest rectangle round what is seen along its
-    normal; then turned about each axis in turn as long as the box gets smaller."""
-    # SciPy takes half a second to load, which commands that never ask for this box need not wait for.
-    from scipy.spatial import ConvexHull
+    normal; then turned about each axis in turn as long as the box gets smaller.
 
-    shape = ConvexHull(points)
-    corners = points[np.sort(shape.vertices)]
-    normals = np.unique(np.round(shape.equations[:, :3], 9) + 0.0, axis=0)
-    normals = normals[(normals[:, 2] > 0) | ((normals[:, 2] == 0) & (normals[:, 0] >= 0))]
-    best, smallest = np.eye(3), float(np.prod(np.ptp(corners, axis=0)))
-    for normal in normals:
-        R = _turned_in_plane(corners, _frame_with_z(normal))
-        volume = _volume(corners, R)
-        if volume < smallest * (1 - 1e-9):
-            best, smallest = R, volume
-    for _ in range(20):
-        before = smallest
-        for turn in _TURNS[0], _TURNS[4], _TURNS[8]:
-            R = _turned_in_plane(corners, best @ turn)
-            volume = _volume(corners, R)
-            if volume < smallest * (1 - 1e-9):
-                best, smallest = R, volume
-        if smallest == before:
+    The box on a face is no smaller than the height over the face times the area of what is seen along its normal, which
+    by Cauchy is half the sum of all faces' areas as seen along it: faces that cannot do better are not tried.
+    """
+    corners, normals, areas = _convex_hull(points)
+    best, smallest = np.eye(3), _volume(corners, np.eye(3))
+    along = np.round(normals, 9) + 0.0
+    along = np.unique(np.where(_points_down(along)[:, None], -along, along), axis=0)
+    heights = np.ptp(corners @ along.T, axis=0)
+    bounds = heights * (np.abs(along @ normals.T) @ areas) / 2
+    for i in np.argsort(bounds, kind="stable"):
+        if bounds[i] > smallest:
             break
-    return best
+        best, smallest = _smaller(corners, _frame_with_z(along[i]), best, smallest)
+    while True:
+        before = smallest
+        for turn in _AXES_FIRST:
+            best, smallest = _smaller(corners, best @ turn, best, smallest)
+        if smallest > before * (1 - 1e-6):
+            return best
 
 
-def _turned_in_plane(points: Float[np.ndarray, "n 3"], R: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3"]:
-    return R @ rotation_about_z(smallest_rectangle_angle((points @ R)[:, :2]))
+def _smaller(
+    corners: Float[np.ndarray, "n 3"],
+    R: Float[np.ndarray, "3 3"],
+    best: Float[np.ndarray, "3 3"],
+    smallest: float,
+) -> tuple[Float[np.ndarray, "3 3"], float]:
+    """The better of the best box yet, and of the smallest with the z axis of R."""
+    turned = R @ rotation_about_z(smallest_rectangle_angle((corners @ R)[:, :2]))
+    volume = _volume(corners, turned)
+    # By more than rounding, so that equally good boxes are told apart by their order, and that by the faces'.
+    return (turned, volume) if volume < smallest * (1 - 1e-9) else (best, smallest)
+
+
+def _convex_hull(
+    points: Float[np.ndarray, "n 3"],
+) -> tuple[Float[np.ndarray, "k 3"], Float[np.ndarray, "f 3"], Float[np.ndarray, "f"]]:
+    """Corners of the convex hull in a stated order, and its faces' normals and areas; of points in a plane, all points
+    and that plane."""
+    middle = points.mean(axis=0)
+    mesh = Manifold.hull_points(points - middle).to_mesh64()
+    corners, faces = np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts).astype(np.int64)
+    if len(faces) == 0:
+        normal = np.linalg.svd(points - middle)[2][-1:]
+        return points, normal, np.zeros(1)
+    a, b, c = np.moveaxis(corners[faces], 1, 0)
+    normals = np.cross(b - a, c - a)
+    doubled = np.linalg.norm(normals, axis=1)
+    real = doubled > 1e-12 * doubled.max()
+    return np.unique(corners + middle, axis=0), normals[real] / doubled[real, None], doubled[real] / 2
+
+
+def _points_down(directions: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:
+    """Whether the last coordinate that is not zero is negative: one of every two opposite directions."""
+    x, y, z = directions.T
+    return (z < 0) | ((z == 0) & ((y < 0) | ((y == 0) & (x < 0))))
 
 
 def _frame_with_z(z: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:

@@ -82,7 +82,8 @@ def mask_from_polygons(polygons: Iterable[Polygon], width: int, height: int) -> 
 
     Each edge is met by the rows' centre lines; right of such a place, a row is turned inside out.
     """
-    turned = np.zeros((height, width + 1), dtype=np.int32)
+    inside = np.zeros((height, width), dtype=bool)
+    rows, columns = list[np.ndarray](), list[np.ndarray]()
     for ring in (ring for polygon in polygons for ring in polygon.rings):
         a, b = ring, np.roll(ring, -1, axis=0)
         low, high = np.minimum(a[:, 1], b[:, 1]), np.maximum(a[:, 1], b[:, 1])
@@ -93,8 +94,16 @@ def mask_from_polygons(polygons: Iterable[Polygon], width: int, height: int) -> 
         row = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count) + first[edge]
         along = (row + 0.5 - a[edge, 1]) / (b[edge, 1] - a[edge, 1])
         x = a[edge, 0] + along * (b[edge, 0] - a[edge, 0])
-        np.add.at(turned, (row, np.clip(np.ceil(x - 0.5), 0, width).astype(np.int64)), 1)
-    return np.cumsum(turned[:, :width], axis=1) % 2 == 1
+        rows.append(row)
+        columns.append(np.clip(np.ceil(x - 0.5), 0, width).astype(np.int64))
+    row, column = np.concatenate([np.zeros(0, np.int64), *rows]), np.concatenate([np.zeros(0, np.int64), *columns])
+    if len(row) == 0:
+        return inside
+    (top, bottom), (left, right) = (row.min(), row.max() + 1), (column.min(), column.max())
+    shape = (int(bottom - top), int(right - left + 1))
+    met = np.bincount((row - top) * shape[1] + column - left, minlength=shape[0] * shape[1]).reshape(shape)
+    inside[top:bottom, left:right] = np.logical_xor.accumulate(met % 2 == 1, axis=1)[:, :-1]
+    return inside
 
 
 def iou(first: Iterable[Polygon], second: Iterable[Polygon]) -> float:

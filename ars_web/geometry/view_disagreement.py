@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import shapely
@@ -20,7 +21,7 @@ def disagreement(scene: ConeScene) -> BadInput:
     by how much the mask must be widened: a point of both is a ray that meets what the others share. Where no single
     view is at fault, those are that do not agree with as many others as do agree.
     """
-    solids = _Solids(scene)
+    solids = _Solids(replace(scene, far=min(scene.far, scene.tellable)))
     if scene.ground is not None and not solids.shared(scene.cones, ground=False).is_empty():
         return BadInput(
             f"nothing that the outlines leave possible is above the support plane at z = {scene.ground:g} m; set the"
@@ -68,17 +69,15 @@ def _misfit(cone: ViewingCone, rest: Manifold) -> float:
 
 
 class _Solids:
-    """The cones of a scene in full length, in the world."""
+    """The cones of a scene in full length, in the world; those of masks that touch the border as if they ended there,
+    because what was found to be empty is so with more reason."""
 
     def __init__(self, scene: ConeScene) -> None:
         self._scene = scene
-        self._solid: dict[int, Manifold] = {}
-        zero = np.zeros(3)
-        for cone in scene.cones:
-            rings = cone.background if cone.is_open else cone.rings
-            self._solid[cone.frame] = (
-                cone.solid(rings, near=scene.near, far=scene.far, origin=zero) if rings else Manifold()
-            )
+        self._solid = {
+            cone.frame: cone.solid(cone.rings, near=scene.near, far=scene.far, origin=np.zeros(3))
+            for cone in scene.cones
+        }
 
     def everything(self, *, ground: bool = True) -> Manifold:
         """A cube that holds all cones."""
@@ -90,8 +89,8 @@ class _Solids:
         return cube
 
     def cut(self, solid: Manifold, cone: ViewingCone) -> Manifold:
-        """What of a solid a cone leaves possible."""
-        return solid - self._solid[cone.frame] if cone.is_open else solid ^ self._solid[cone.frame]
+        """What of a solid is in a cone."""
+        return solid ^ self._solid[cone.frame]
 
     def shared(self, cones: Sequence[ViewingCone], *, ground: bool) -> Manifold:
         """What cones share."""

@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 import shapely
 from jaxtyping import Float, Int
-from manifold3d import Manifold, Mesh64, triangulate
+from manifold3d import Error, Manifold, Mesh64, triangulate
 
 from ars_web.errors import BadInput
 from ars_web.geometry import camera as cameras
@@ -105,7 +105,9 @@ class ViewingCone:
                 np.column_stack([this, after + n, this + n]),
             ]
         )
-        return Manifold(Mesh64(np.ascontiguousarray(vertices), np.ascontiguousarray(faces.astype(np.uint64))))
+        made = Manifold(Mesh64(np.ascontiguousarray(vertices), np.ascontiguousarray(faces.astype(np.uint64))))
+        assert made.status() == Error.NoError, made.status()
+        return made
 
 
 def _next_in_rings(lengths: Sequence[int]) -> Int[np.ndarray, "n"]:

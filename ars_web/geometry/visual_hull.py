@@ -15,16 +15,13 @@ from jaxtyping import Float, Int
 from ars_web.errors import BadInput, ViewsDisagree
 from ars_web.geometry import cone_intersection
 from ars_web.geometry.camera import Camera
-from ars_web.geometry.cone_intersection import ConeScene
+from ars_web.geometry.cone_intersection import SMALLEST_ANGLE, ConeScene
 from ars_web.geometry.polygon import Polygon
 from ars_web.geometry.projection_jacobian import pixels_with_jacobian
 from ars_web.geometry.rigid_transform import Transform
 from ars_web.geometry.triangulation import CLOSEST_PLACES
 from ars_web.geometry.view_disagreement import disagreement
 from ars_web.geometry.viewing_cone import ViewingCone, cone_of_mask
-
-SMALLEST_ANGLE = math.radians(5)
-"""Between two views. Below it, an outline's error of a pixel moves the hull's ends by more than its width."""
 
 WIDEST = 1000.0
 """Pixels that masks may be widened by."""
