@@ -23,6 +23,7 @@ from ars_web.scene.cameras import add_cameras
 from ars_web.scene.extent import free_lens, recording_extent
 from ars_web.scene.ground import add_ground
 from ars_web.scene.hardening import Visitor
+from ars_web.scene.hulls import HullNodes
 from ars_web.scene.photos import Photos
 from ars_web.scene.picking import Ray, pixel_angle
 from ars_web.scene.placing import NOT_CONNECTED, Sight, placed, usual_size
@@ -62,6 +63,7 @@ class SessionScene:
         self.server = hardening.guarded_server()
         extent = recording_extent(recording.frames.Ts_world_camera)
         boxes = BoxNodes(self.server)
+        self._hulls = HullNodes(self.server, boxes)
         self._around = Surroundings(
             recording=recording,
             extent=extent,
@@ -137,6 +139,7 @@ class SessionScene:
             server.scene.add_light_ambient("/light", intensity=math.pi)  # a face has its own colour, from all sides
             add_ground(server.scene, around.extent)
             add_cameras(server.scene, around.recording.frames, around.recording.cameras, around.extent)
+        self._hulls.know(around.recording.hulls)
         around.boxes.show(around.recording.state)
         self._set_initial_camera()
         server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
@@ -265,9 +268,10 @@ class SessionScene:
             while self._stale:
                 self._stale = False
                 loop = asyncio.get_running_loop()
-                state = await loop.run_in_executor(self._workers, self._store.state, self._around.recording.id)
-                self._around.boxes.show(state)
-                self._revision = state.revision
+                now = await loop.run_in_executor(self._workers, self._store.snapshot, self._around.recording.id)
+                self._hulls.know(now.hulls)
+                self._around.boxes.show(now.state)
+                self._revision = now.state.revision
         except ArsError as error:  # deleted, or the disk is full: those who ask for the session are told
             log.info("session %s: %s", self._around.recording.id, error)
         finally:

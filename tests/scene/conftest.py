@@ -93,10 +93,26 @@ class Visitor:
 
 
 def _unpacked(raw: str | bytes) -> list[dict[str, Any]]:
+    """Messages with their arrays, which follow them on the wire: each padded to eight bytes, named by its place."""
     assert isinstance(raw, bytes)
     packed = int.from_bytes(raw[8:16], "little")
     inner = zstandard.ZstdDecompressor().decompress(raw[16 : 16 + packed])
-    return msgspec.msgpack.decode(inner)["messages"]
+    told = msgspec.msgpack.decode(inner)
+    buffers: list[bytes] = []
+    at = 16 + packed
+    for length in told["binaryBufferLengths"]:
+        at += -at % 8
+        buffers.append(raw[at : at + length])
+        at += length
+    return _filled(told["messages"], buffers)
+
+
+def _filled(value: Any, buffers: list[bytes]) -> Any:
+    if isinstance(value, dict) and "__binary_index" in value:
+        return np.frombuffer(buffers[value["__binary_index"]], dtype=value["dtype"])
+    if isinstance(value, dict):
+        return {name: _filled(part, buffers) for name, part in value.items()}
+    return [_filled(part, buffers) for part in value] if isinstance(value, list) else value
 
 
 @pytest.fixture
