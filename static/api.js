@@ -224,7 +224,7 @@ export const changeMask = (sid, id, revision, changes) => request("PUT", under(s
 /** @param {string} sid @param {number} id @param {number} revision @returns {Promise<void>} */
 export const deleteMask = (sid, id, revision) => request("DELETE", under(sid, `/masks/${id}`), { revision });
 
-/** @param {string} sid @param {number} id @param {number | undefined} revision undefined: there is no box yet @param {object} options @returns {Promise<Box>} */
+/** @param {string} sid @param {number} id @param {number | undefined} revision undefined: there is no box yet @param {object} options @returns {Promise<Box & {hull: object}>} */
 export const makeHull = (sid, id, revision, options) => request("PUT", under(sid, `/boxes/${id}/hull`), { revision, body: options });
 
 /** @param {string} sid @param {object} wish @returns {Promise<import("./store.js").HullPreview>} */

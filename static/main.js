@@ -36,7 +36,7 @@ Object.assign(
     acceptMask: maskEditing.acceptMask,
     deleteMask: maskEditing.deleteMask,
     makeHull: maskEditing.makeHull,
-    previewHull: (views, options, show_in) => api.previewHull(sid(), { views, ...options, show_in }),
+    previewHull: (views, { orientation, widen_px, ground }, show_in) => api.previewHull(sid(), { views, orientation, widen_px, ground, show_in }),
     combine: async (change) => (await api.combine(sid(), change)).polygons,
     segment: async (frame, prompt) => (await api.segment(sid(), frame, prompt)).polygons,
     outlineRest: (id) => api.outlineRest(sid(), id),

@@ -55,7 +55,10 @@ export async function deleteMask(id) {
 
 /** @type {import("./store.js").Actions["makeHull"]} */
 export async function makeHull(id, options) {
-  await inTurn(turn(id), async () => takeBox(await api.makeHull(sid(), id, store.boxes.value.get(id)?.revision, options)));
+  await inTurn(turn(id), async () => {
+    const { hull: _, ...box } = await api.makeHull(sid(), id, store.boxes.value.get(id)?.revision, options);
+    takeBox(box);
+  });
 }
 
 /** @type {import("./store.js").Actions["refineBox"]} */
