@@ -22,19 +22,23 @@ Scene = tuple[Camera, np.ndarray, Box]
 @pytest.fixture(scope="session")
 def oracle() -> ModuleType:
     """`label_oracle.py`, the slow readable version of the labels."""
-    spec = importlib.util.spec_from_file_location("label_oracle", Path(__file__).parent / "label_oracle.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
+    return _beside("label_oracle")
 
 
 @pytest.fixture(scope="session")
 def mesh_oracle() -> ModuleType:
     """`mesh_oracle.py`, the slow readable version of the labels of meshes."""
-    spec = importlib.util.spec_from_file_location("mesh_oracle", Path(__file__).parent / "mesh_oracle.py")
+    return _beside("mesh_oracle")
+
+
+@pytest.fixture(scope="session")
+def hulls() -> ModuleType:
+    """`hull_oracle.py`, the slow readable version of the visual hull, with shapes and cameras round them."""
+    return _beside("hull_oracle")
+
+
+def _beside(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, Path(__file__).parent / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -50,12 +54,12 @@ def solids() -> dict[str, Mesh]:
     hollow = trimesh.creation.box((0.9, 0.9, 0.9))
     hollow.invert()
     shapes = {
-        "ball": trimesh.creation.icosphere(2, 0.5),
-        "torus": trimesh.creation.torus(0.37, 0.13, major_sections=20, minor_sections=10),
+        "ball": trimesh.creation.icosphere(1, 0.5),
+        "torus": trimesh.creation.torus(0.37, 0.13, major_sections=14, minor_sections=8),
         "L": trimesh.creation.extrude_polygon(ell, 0.4),
-        "can": trimesh.creation.cylinder(0.4, 1.0, sections=24),
+        "can": trimesh.creation.cylinder(0.4, 1.0, sections=14),
         "two": trimesh.util.concatenate(
-            [trimesh.creation.box((0.3, 0.3, 0.3)), trimesh.creation.icosphere(1, 0.3).apply_translation([0.7, 0.1, 0])]
+            [trimesh.creation.box((0.3, 0.3, 0.3)), trimesh.creation.icosphere(0, 0.3).apply_translation([0.7, 0.1, 0])]
         ),
         "hollow": trimesh.util.concatenate([trimesh.creation.box((1.0, 1.0, 1.0)), hollow]),
     }
