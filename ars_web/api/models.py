@@ -277,19 +277,11 @@ class EditJson(BaseModel):
     @classmethod
     def of(cls, edit: Edit) -> "EditJson":
         """The JSON of an edit."""
-        return cls(
-            revision=edit.revision,
-            author=edit.author,
-            summary=edit.summary,
-            undoes=edit.undoes,
-            redoes=edit.redoes,
-            at=edit.at,
-            changes=[_change_json(change) for change in edit.changes],
-        )
+        return cls(**_entry(edit), changes=[_change_json(change) for change in edit.changes])
 
 
 class PastEdit(EditJson):
-    """One entry of the session's history, as it stands now."""
+    """One entry of the session's history, as it stands now; its masks are without polygons and points."""
 
     undone: bool = Field(description="its effect was taken back, by a later undo (or, of an undo, redo) that stands")
     own: bool = Field(description="made by the caller, whose undo and redo are about own edits only")
@@ -320,7 +312,8 @@ class HistoryPage(BaseModel):
         return cls(
             items=[
                 PastEdit(
-                    **EditJson.of(edit).model_dump(),
+                    **_entry(edit),
+                    changes=[_past_change_json(change) for change in edit.changes],
                     undone=edit.revision in history.taken_back,
                     own=edit.author == author,
                 )
@@ -411,6 +404,12 @@ def current_json(current: object) -> Mapping[str, Any] | None:
     return None
 
 
+def _entry(edit: Edit) -> dict[str, Any]:
+    """An edit without its changes."""
+    names = ("revision", "author", "summary", "undoes", "redoes", "at")
+    return {name: getattr(edit, name) for name in names}
+
+
 def _change_json(change: Change) -> dict[str, Any]:
     if isinstance(change, BoxChange):
         before, after = current_json(change.before), current_json(change.after)
@@ -419,7 +418,14 @@ def _change_json(change: Change) -> dict[str, Any]:
         before, after = current_json(change.before), current_json(change.after)
         return {"kind": "class", "id": change.class_id, "before": before, "after": after}
     if isinstance(change, MaskChange):
-        # What it was is told apart by null alone; its outline, of thousands of corners, would double the message.
-        before = None if change.before is None else mask_json_without_outline(change.before)
-        return {"kind": "mask", "id": change.mask_id, "before": before, "after": current_json(change.after)}
+        # The old outline, of thousands of corners, would double the message, and nobody asks for it.
+        return {**_past_change_json(change), "after": current_json(change.after)}
     return {"kind": "name", "id": None, "before": change.before, "after": change.after}
+
+
+def _past_change_json(change: Change) -> dict[str, Any]:
+    """As `_change_json`, masks without their outlines: a page of history would have megabytes of them."""
+    if isinstance(change, MaskChange):
+        before, after = (None if m is None else mask_json_without_outline(m) for m in (change.before, change.after))
+        return {"kind": "mask", "id": change.mask_id, "before": before, "after": after}
+    return _change_json(change)

@@ -30,9 +30,9 @@ from ars_web.sessions.drafting import (
     refuse_locked,
 )
 from ars_web.sessions.edit_json import request_digest
-from ars_web.sessions.edits import BoxChange, ClassChange, Edit, MaskChange, NameChange, inverse, restated
+from ars_web.sessions.edits import BoxChange, Change, ClassChange, Edit, MaskChange, NameChange, inverse, restated
 from ars_web.sessions.history import LogEntry, to_redo, to_undo
-from ars_web.sessions.model import ObjectClass, SessionSummary, VirtualBox
+from ars_web.sessions.model import ObjectClass, SessionState, SessionSummary, VirtualBox
 from ars_web.sessions.names import FreshNames, checked_name
 from ars_web.sessions.object_drafting import MaskDraft, reclassed
 from ars_web.sessions.object_editing import ObjectEditing, first_box
@@ -323,6 +323,7 @@ class SessionEditor(ObjectEditing):
             if isinstance(error.current, str):  # the session's name; callers get the whole summary
                 raise Conflict(str(error), current=session.summary(sid)) from error
             raise
+        _refuse_locked_since(changes, session.state)
         return self._append(
             session,
             changes,
@@ -335,6 +336,16 @@ class SessionEditor(ObjectEditing):
 
 def _additions(boxes: Sequence[VirtualBox]) -> tuple[BoxChange, ...]:
     return tuple(BoxChange(box.id, None, box) for box in boxes)
+
+
+def _refuse_locked_since(changes: Sequence[Change], state: SessionState) -> None:
+    """A box that someone locked since keeps its masks, also where the edit did not change the box itself."""
+    own = {change.box_id for change in changes if isinstance(change, BoxChange)}
+    for change in changes:
+        if isinstance(change, MaskChange) and change.box_id not in own:
+            box = state.boxes.get(change.box_id)
+            if box is not None and box.locked:
+                raise Conflict(f"box {box.id} ({box.name!r}) was locked meanwhile, and its masks with it", current=box)
 
 
 def _first_class(edit: Edit) -> ObjectClass:

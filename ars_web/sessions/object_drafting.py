@@ -120,9 +120,9 @@ def object_changes(state: SessionState, draft: ObjectDraft) -> tuple[BoxChange, 
         raise BadInput("a new box has no revision that could be expected; leave it out, or say which box it is")
     elif before is not None:
         raise Conflict(f"box {before.id} ({before.name!r}) is there already", current=before)
-    object_id = _object_id(state, draft.box_id)
     if before is not None:
         refuse_locked(before, "place", "size")
+    object_id = _object_id(state, draft.box_id)
     class_id = existing_class(state, draft.class_id).id
     after = VirtualBox(
         id=object_id,

@@ -12,9 +12,11 @@ import pytest
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box
 from ars_web.geometry.camera import Camera
+from ars_web.geometry.polygon import Polygon
 from ars_web.recordings.recording import Frame, Recording
 from ars_web.sessions import migration
 from ars_web.sessions.editing import SessionEditor
+from ars_web.sessions.hull_mesh import HullMesh
 from ars_web.sessions.store import SessionStore
 
 MakeRecording = Callable[..., Recording]
@@ -68,6 +70,28 @@ def a_box() -> Callable[..., Box]:
     def make(x: float = 0.0, size: float = 0.1) -> Box:
         R = rigid_transform.rotation_about_z(0.3 + x)
         return Box(rigid_transform.from_rotation(R, np.array([x, 0.2, 0.3])), np.array([size, 0.2, 0.3]))
+
+    return make
+
+
+@pytest.fixture
+def outline() -> Callable[..., tuple[Polygon, ...]]:
+    """A triangle with a hole, at x, y pixels, in any frame's image."""
+
+    def make(x: float = 20.0, y: float = 30.0) -> tuple[Polygon, ...]:
+        corners = np.array([[0.0, 0.0], [60.0, 0.0], [60.0, 50.0]]) + np.array([x, y])
+        return (Polygon(corners, (corners / 4 + np.array([x + 25, y + 5]) - corners[0] / 4,)),)
+
+    return make
+
+
+@pytest.fixture
+def a_hull() -> Callable[..., HullMesh]:
+    """A tetrahedron in its box, as high as asked."""
+
+    def make(height: float = 1.0) -> HullMesh:
+        corners = np.array([[-0.5, -0.5, -0.5], [0.5, -0.5, -0.5], [0.0, 0.5, -0.5], [0.1, 0.1, height - 0.5]])
+        return HullMesh(corners, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]))
 
     return make
 
