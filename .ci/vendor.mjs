@@ -12,13 +12,13 @@ const checking = process.argv.includes("--check");
 
 /** Each icon that the page uses, by Lucide's name. */
 const ICONS = [
-  "axis-3d", "badge-check", "box", "boxes", "check", "chevron-down", "chevron-left", "chevron-right", "chevron-up",
+  "axis-3d", "badge-check", "box", "boxes", "brush", "check", "chevron-down", "chevron-left", "chevron-right", "chevron-up",
   "chevrons-left", "chevrons-right", "circle-alert", "circle-question-mark", "clipboard-list", "cloud-off", "command", "copy",
-  "crosshair", "download", "ellipsis", "eye", "eye-off", "file-archive", "film", "folder", "folder-open",
-  "grid-3x3", "hand", "rotate-ccw-clock", "house", "image", "info", "keyboard", "layers", "lightbulb", "list", "loader-circle",
+  "crosshair", "download", "ellipsis", "eraser", "eye", "eye-off", "file-archive", "film", "folder", "folder-open",
+  "grid-3x3", "hand", "rotate-ccw-clock", "house", "image", "info", "keyboard", "lasso", "layers", "lightbulb", "list", "loader-circle",
   "lock", "lock-open", "magnet", "maximize", "minus", "moon", "mouse-pointer-2", "move", "move-3d", "move-diagonal-2",
   "package", "pencil", "play", "plus", "redo-2", "refresh-cw", "rotate-3d", "rotate-cw", "scale-3d", "search", "skip-back",
-  "skip-forward", "sun", "tag", "trash", "triangle-alert", "undo-2", "upload", "users", "wand-sparkles", "waypoints", "x",
+  "skip-forward", "square-dashed", "sun", "tag", "trash", "triangle-alert", "undo-2", "upload", "users", "wand-sparkles", "waypoints", "x",
 ];
 
 /** Where each module lies, seen from another vendored module's folder. */
