@@ -158,10 +158,10 @@ def boxes_of_clouds(
     tolerance: float,
     bbox: Array,
 ) -> tuple[Array, Array]:
-    """The boxes of contours' vertices in n frames, written to `bbox` (n, 4): the vertices on the normalised plane (x,
-    y) and
-    in the image (u, v), and the rest as `cast_clouds` returns it. `lengths` (e,) are the edges', the longest first;
-    `bends` (n,) bound the second derivative of their images.
+    """The boxes of contours' vertices in n frames, written to `bbox` (n, 4).
+
+    The vertices are given on the normalised plane (x, y) and in the image (u, v), the rest as `cast_clouds` returns it.
+    `lengths` (e,) are the edges', the longest first; `bends` (n,) bound the second derivative of their images.
 
     Returns those edges that may go beyond their ends, and by more than the tolerance beyond the box, on the normalised
     plane (k, 2, 2), and the frame of each (k,).

@@ -194,8 +194,9 @@ def areas(width: float, height: float, sides: Array) -> tuple[float, float]:
             whole += (vb - va) * found[0]
             inside += (vb - va) * found[1] if seen else 0.0
             continue
-        start = 0.0
-        for end in crossings(active, count, top, bottom):
+        start, cuts = 0.0, crossings(active, count, top, bottom)
+        for cut in range(len(cuts)):
+            end: float = cuts[cut]
             for i in range(count):
                 side = active[i]
                 keys[side] = top[side] + 0.5 * (start + end) * (bottom[side] - top[side])
@@ -217,8 +218,9 @@ def strip_areas(
         side = active[i]
         before, level = level, level + turns[side]
         if (before > 0) != (level > 0):
-            along = bottom[side] - top[side]
-            ua, ub = top[side] + start * along, top[side] + end * along
+            along: float = bottom[side] - top[side]
+            ua: float = top[side] + start * along
+            ub: float = top[side] + end * along
             sign = (end - start) * (1.0 if before > 0 else -1.0)
             whole += sign * 0.5 * (ua + ub)
             inside += sign * clamped_mean(ua, ub, width)

@@ -25,7 +25,7 @@ class Label:
     truncated: float
 
 
-def label(camera: Camera, T_world_camera: np.ndarray, mesh: Mesh, *, near: float, step: float = 0.05) -> Label:
+def label(camera: Camera, T_world_camera: np.ndarray, mesh: Mesh, *, near: float, step: float = 0.1) -> Label:
     """The label of a mesh, from points along every border about `step` pixels apart."""
     nothing = np.full(4, np.nan)
     vertices = rigid_transform.transform_points(rigid_transform.invert(T_world_camera), mesh.vertices_world)
@@ -72,37 +72,40 @@ def plane_lines(triangles: np.ndarray, *, near: float) -> np.ndarray:
 def sampled(lines: np.ndarray, camera: Camera, *, step: float) -> np.ndarray:
     """Points along the parts of lines that lie within the valid radius, `step` pixels apart where the lens neither
     stretches nor shrinks, their ends included."""
-    found = []
-    for a, b in lines:
-        d = b - a
-        if d @ d == 0:
-            continue
-        roots = np.roots([d @ d, 2 * a @ d, a @ a - camera.valid_radius**2])
-        if np.iscomplex(roots).any():
-            continue
-        low, high = max(roots.min(), 0.0), min(roots.max(), 1.0)
-        if low < high:
-            count = int(np.clip(np.linalg.norm(d) * (high - low) * max(camera.fx, camera.fy) / step, 2, 20_000))
-            found.append(a + np.linspace(low, high, count)[:, None] * d)
-    return np.concatenate([np.zeros((0, 2)), *found])
+    starts, along = lines[:, 0], lines[:, 1] - lines[:, 0]
+    a, b = (along**2).sum(axis=1), (starts * along).sum(axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root = np.sqrt(b * b - a * ((starts**2).sum(axis=1) - camera.valid_radius**2))
+        low, high = np.maximum((-b - root) / a, 0.0), np.minimum((-b + root) / a, 1.0)
+    found = [np.zeros((0, 2))]
+    for start, direction, first, last in zip(starts, along, low, high, strict=True):
+        if first < last:
+            pixels = np.linalg.norm(direction) * (last - first) * max(camera.fx, camera.fy)
+            found.append(start + np.linspace(first, last, int(np.clip(pixels / step, 2, 20_000)))[:, None] * direction)
+    return np.concatenate(found)
 
 
 def rays_meet(plane: np.ndarray, triangles: np.ndarray, *, near: float) -> np.ndarray:
     """Whether the rays (x, y, 1) meet a triangle (f, 3, 3) beyond the near plane; rays that are NaN do not."""
     a, b, c = (triangles[:, i] for i in range(3))
     volume = np.einsum("fi,fi->f", a, np.cross(b, c))
+    sides = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)])
     met = np.zeros(len(plane), dtype=bool)
-    for start in range(0, len(plane), 4096):
-        rays = np.column_stack([plane[start : start + 4096], np.ones(len(plane[start : start + 4096]))])
-        u, v, w = rays @ np.cross(b, c).T, rays @ np.cross(c, a).T, rays @ np.cross(a, b).T
-        through = ((u >= 0) & (v >= 0) & (w >= 0)) | ((u <= 0) & (v <= 0) & (w <= 0))
+    candidates = np.arange(len(plane))
+    if (triangles[..., 2] > 0).all():
+        flat = (triangles[..., :2] / triangles[..., 2:]).reshape(-1, 2)
+        candidates = np.flatnonzero(((plane >= flat.min(axis=0)) & (plane <= flat.max(axis=0))).all(axis=1))
+    for start in range(0, len(candidates), 1024):
+        some = candidates[start : start + 1024]
+        part = plane[some]
+        shares = np.column_stack([part, np.ones(len(part))]) @ sides.transpose(0, 2, 1)
+        through = (shares >= 0).all(axis=0) | (shares <= 0).all(axis=0)
         with np.errstate(divide="ignore", invalid="ignore"):
-            depth = volume / (u + v + w)
-        met[start : start + 4096] = (through & (depth >= near)).any(axis=1)
+            met[some] = (through & (volume / shares.sum(axis=0) >= near)).any(axis=1)
     return met
 
 
-def truncation(camera: Camera, triangles: np.ndarray, plane: np.ndarray, *, near: float, side: int = 250) -> float:
+def truncation(camera: Camera, triangles: np.ndarray, plane: np.ndarray, *, near: float, side: int = 150) -> float:
     """The share of the amodal outline's area outside the image, from a grid of rays over the outline, each of which
     stands for as much of the image as the lens makes of its cell."""
     low, high = plane.min(axis=0), plane.max(axis=0)
