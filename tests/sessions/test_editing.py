@@ -10,10 +10,13 @@ from hypothesis import strategies as st
 from ars_web.errors import ArsError, BadInput, Conflict, NotFound
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box
+from ars_web.geometry.polygon import Polygon
 from ars_web.sessions.boxes_json import TransformJson, transform_json
-from ars_web.sessions.editing import BoxDraft, NothingToUndo, SessionEditor
+from ars_web.sessions.editing import BoxDraft, MaskDraft, NothingToUndo, SessionEditor
 from ars_web.sessions.edits import Edit, differences, replay, same
-from ars_web.sessions.model import SessionState
+from ars_web.sessions.hull_mesh import HullMesh
+from ars_web.sessions.model import HullOptions, SessionState
+from ars_web.sessions.outlines import polygons_json
 from ars_web.sessions.store import SessionStore
 
 MakeBox = Callable[..., Box]
@@ -25,8 +28,11 @@ def contents(state: SessionState) -> dict[str, object]:
         "name": state.name,
         "classes": [(c.id, c.name, c.color, c.default_size) for c in state.classes.values()],
         "boxes": [
-            (b.id, b.class_id, b.name, b.locked, b.box.T_world_box.tolist(), b.box.size.tolist())
+            (b.id, b.class_id, b.name, b.locked, b.hull, b.box.T_world_box.tolist(), b.box.size.tolist())
             for b in state.boxes.values()
+        ],
+        "masks": [
+            (m.id, m.box_id, m.frame, m.class_id, m.accepted, polygons_json(m.polygons)) for m in state.masks.values()
         ],
     }
 
@@ -382,6 +388,11 @@ steps = st.lists(
                 "size",
                 "lock",
                 "duplicate",
+                "mask",
+                "mask",
+                "unmask",
+                "object",
+                "object",
                 "undo",
                 "undo",
                 "redo",
@@ -390,7 +401,7 @@ steps = st.lists(
         st.sampled_from(["ann", "bob"]),
         st.integers(0, 7),
     ),
-    max_size=40,
+    max_size=50,
 )
 
 
@@ -414,6 +425,9 @@ def test_whatever_is_done_the_state_is_what_the_log_replays(
             continue
         state = store.state(sid)
         new = set(state.boxes) - set(before.boxes)
+        places = [(mask.box_id, mask.frame) for mask in state.masks.values()]
+        assert len(set(places)) == len(places)
+        assert {box.hull for box in state.boxes.values()} - {None} == set(store.snapshot(sid).hulls)
         if action == "add":
             assert not new & given_ids
             given_ids |= new
@@ -425,13 +439,51 @@ def test_whatever_is_done_the_state_is_what_the_log_replays(
         assert differences(again.state(sid), state) == []
 
 
+TRIANGLE = np.array([[0.0, 0.0], [9.0, 0.0], [9.0, 7.5]])
+TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+
+
 def act(editor: SessionEditor, sid: str, state: SessionState, action: str, author: str, n: int) -> None:
-    boxes, classes = list(state.boxes.values()), list(state.classes.values())
+    boxes, classes, masks = list(state.boxes.values()), list(state.classes.values()), list(state.masks.values())
+    objects = [*state.boxes, *(mask.box_id for mask in masks), None]
     R = rigid_transform.rotation_about_z(0.1 * n)
     T = rigid_transform.from_rotation(R, np.array([0.1 * n, 0.0, 1.0]))
     if action == "add":
         class_id = classes[n % len(classes)].id if classes else 0
         editor.add_box(sid, class_id=class_id, box=Box(T, np.array([0.1, 0.2, 0.3])), author=author)
+    elif action == "mask":
+        box_id = objects[n % len(objects)]
+        before = next((m for m in masks if (m.box_id, m.frame) == (box_id, n % 3)), None)
+        editor.put_mask(
+            sid,
+            box_id=box_id,
+            frame=n % 3,
+            class_id=0 if box_id is None else None,
+            polygons=(Polygon(TRIANGLE + n),),
+            accepted=n % 2 == 0,
+            expected_revision=None if before is None else before.revision,
+            author=author,
+        )
+    elif action == "unmask" and masks:
+        mask = masks[n % len(masks)]
+        editor.delete_mask(sid, mask.id, expected_revision=mask.revision, author=author)
+    elif action == "object":
+        box_id = objects[n % len(objects)]
+        box = state.boxes.get(box_id or 0)
+        had = [mask for mask in masks if mask.box_id == box_id]
+        editor.put_object(
+            sid,
+            box_id=box_id,
+            class_id=had[0].class_id if had else 0,
+            box=Box(T, np.array([0.1, 0.2, 0.3])),
+            hull=HullMesh(np.eye(4, 3) * (n + 1) / 8, TETRAHEDRON),
+            hull_options=HullOptions(widen=float(n)),
+            masks=[MaskDraft(n % 3, (Polygon(TRIANGLE * 2 + n),), "proposed", n < 4)],
+            drop_masks=[mask.id for mask in had if mask.frame != n % 3][:1],
+            expected_revision=None if box is None else box.revision,
+            expected_masks={mask.id: mask.revision for mask in had},
+            author=author,
+        )
     elif action == "class":
         editor.add_class(sid, name=f"class {n}", author=author)
     elif action == "undo":
