@@ -26,12 +26,16 @@ from sqlalchemy import Connection
 from ars_web.errors import ArsError
 from ars_web.geometry.box import Box
 from ars_web.geometry.camera import Camera
+from ars_web.geometry.polygon import Polygon
 from ars_web.recordings.recording import Frame, Recording
 from ars_web.sessions import database, rows
-from ars_web.sessions.editing import SessionEditor
+from ars_web.sessions.editing import MaskDraft, SessionEditor
 from ars_web.sessions.edits import Edit
-from ars_web.sessions.model import SessionState
+from ars_web.sessions.hull_mesh import HullMesh
+from ars_web.sessions.model import HullOptions, SessionState
 from ars_web.sessions.store import SessionStore
+
+TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
 
 LONGEST_LIFE = 0.4
 """Seconds an editor lives at most."""
@@ -67,9 +71,10 @@ def edit_for_ever(folder: Path, sid: str, *, seed: int, pipe: int, without: str 
 
 def edit_once(store: SessionStore, editor: SessionEditor, sid: str, chance: random.Random) -> None:
     state, author = store.state(sid), chance.choice(["ann", "bob"])
-    boxes = list(state.boxes.values())
+    boxes, masks = list(state.boxes.values()), list(state.masks.values())
+    deeds = ["add", "add", "move", "move", "delete", "class", "outline", "object", "unmask", "undo", "redo"]
     try:
-        match chance.choice(["add", "add", "move", "move", "delete", "class", "undo", "redo"]):
+        match chance.choice(deeds):
             case "add":
                 editor.add_box(sid, class_id=0, box=Box(np.eye(4), np.ones(3)), author=author, key=str(chance.random()))
             case "move" if boxes:
@@ -80,12 +85,46 @@ def edit_once(store: SessionStore, editor: SessionEditor, sid: str, chance: rand
                 editor.delete_box(sid, box.id, expected_revision=box.revision, author=author)
             case "class":
                 editor.add_class(sid, name=f"class {state.next_class_id}", author=author)
+            case "outline":
+                mask = chance.choice([*masks, None])
+                # Another outline in the place of one that is there, or the first of a new object.
+                editor.put_mask(
+                    sid,
+                    box_id=None if mask is None else mask.box_id,
+                    frame=0,
+                    class_id=0 if mask is None else None,
+                    polygons=an_outline(chance),
+                    expected_revision=None if mask is None else mask.revision,
+                    author=author,
+                )
+            case "object":
+                mask = chance.choice([*masks, None])
+                box = None if mask is None else state.boxes.get(mask.box_id)
+                editor.put_object(
+                    sid,
+                    box_id=None if mask is None else mask.box_id,
+                    class_id=0,
+                    box=Box(np.eye(4), np.ones(3)),
+                    hull=HullMesh(np.eye(4, 3) * chance.random(), TETRAHEDRON),
+                    hull_options=HullOptions(),
+                    masks=[MaskDraft(0, an_outline(chance))],
+                    expected_revision=None if box is None else box.revision,
+                    expected_masks={} if mask is None else {mask.id: mask.revision},
+                    author=author,
+                )
+            case "unmask" if masks:
+                mask = chance.choice(masks)
+                editor.delete_mask(sid, mask.id, expected_revision=mask.revision, author=author)
             case "undo":
                 editor.undo(sid, author=author)
             case _:
                 editor.redo(sid, author=author)
     except ArsError:
         pass  # nothing to undo, or two authors at one box: an answer like any other
+
+
+def an_outline(chance: random.Random) -> tuple[Polygon, ...]:
+    return (Polygon(np.array([[chance.uniform(0, 8), chance.uniform(0, 8)] for _ in range(4)])),)
 
 
 def one_round(folder: Path, sid: str, *, chance: random.Random, without: str | None, die_between: bool) -> int:

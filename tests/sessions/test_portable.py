@@ -14,11 +14,14 @@ import pytest
 
 from ars_web.errors import BadFile, BadInput, NotFound, RefusedPath, StoreError, TooLarge
 from ars_web.geometry.box import Box
+from ars_web.geometry.polygon import Polygon
 from ars_web.recordings.recording import Recording, SkippedFrame
 from ars_web.sessions import migration, session_folders
 from ars_web.sessions.archive import ArchiveLimits
-from ars_web.sessions.editing import SessionEditor
+from ars_web.sessions.editing import MaskDraft, SessionEditor
 from ars_web.sessions.edits import Edit, differences
+from ars_web.sessions.hull_mesh import HullMesh
+from ars_web.sessions.model import HullOptions
 from ars_web.sessions.portable import export_session, import_session
 from ars_web.sessions.store import SessionStore
 
@@ -26,7 +29,7 @@ MakeBox = Callable[..., Box]
 
 
 @pytest.fixture
-def sid(store: SessionStore, editor: SessionEditor, make_recording: Callable[..., Recording], a_box: MakeBox) -> str:
+def plain(store: SessionStore, editor: SessionEditor, make_recording: Callable[..., Recording], a_box: MakeBox) -> str:
     """A session with images, and edits of two authors."""
     recording = make_recording(4, images=True, skipped=(SkippedFrame("x.jpg", "no pose", "poses.txt:3"),))
     sid = store.create(recording, name="table").id
@@ -34,6 +37,25 @@ def sid(store: SessionStore, editor: SessionEditor, make_recording: Callable[...
     editor.add_box(sid, class_id=1, box=a_box(), author="you", key="k")
     editor.change_box(sid, 1, expected_revision=2, size=np.array([1.0, 2.0, 3.0]), author="me")
     editor.undo(sid, author="me")
+    return sid
+
+
+@pytest.fixture
+def sid(
+    editor: SessionEditor,
+    plain: str,
+    a_box: MakeBox,
+    a_hull: Callable[..., HullMesh],
+    outline: Callable[..., tuple[Polygon, ...]],
+) -> str:
+    """That session with a box, its hull and masks, and an outline without a box."""
+    sid = plain
+    masks = [MaskDraft(frame, outline(20 + frame)) for frame in (0, 2)]
+    editor.put_object(
+        sid, box_id=None, class_id=0, box=a_box(1.0), hull=a_hull(), hull_options=HullOptions("upright"),
+        masks=masks, author="you",
+    )  # fmt: skip
+    editor.put_mask(sid, box_id=None, frame=1, class_id=0, polygons=outline(), expected_revision=None, author="you")
     return sid
 
 
@@ -66,6 +88,10 @@ def test_a_session_comes_back_whole(
     assert differences(carried.state, original.state) == []
     assert [told(edit) for edit in elsewhere.edits(imported.id)] == [told(edit) for edit in log]
     assert elsewhere.skipped(imported.id) == skipped
+    assert {k: hull.vertices.tolist() for k, hull in carried.hulls.items()} == {
+        k: hull.vertices.tolist() for k, hull in original.hulls.items()
+    }
+    assert (len(carried.hulls), len(carried.state.masks)) == (1, 3)
     assert carried.cameras == cameras
     assert carried.frames.names == original.frames.names
     assert np.array_equal(carried.frames.Ts_world_camera, original.frames.Ts_world_camera)
@@ -80,9 +106,9 @@ def test_a_session_comes_back_whole(
 def test_an_import_may_be_given_a_name(store: SessionStore, elsewhere: SessionStore, sid: str, tmp_path: Path):
     export_session(store, sid, tmp_path / "carried")
     imported = import_session(elsewhere, tmp_path / "carried", name="desk")
-    assert (imported.name, imported.revision) == ("desk", 5)
-    assert elsewhere.edits(imported.id, after=4)[0].summary == "Rename the session to desk"
-    assert import_session(elsewhere, tmp_path / "carried", name="table").revision == 4
+    assert (imported.name, imported.revision) == ("desk", 7)
+    assert elsewhere.edits(imported.id, after=6)[0].summary == "Rename the session to desk"
+    assert import_session(elsewhere, tmp_path / "carried", name="table").revision == 6
     with pytest.raises(BadInput, match="a session needs a name"):
         import_session(elsewhere, tmp_path / "carried", name="")
 
@@ -237,7 +263,7 @@ TAMPERINGS = {
     ),
     "no frames": (
         "DELETE FROM frame",
-        "or there are none",
+        "a row of mask refers to a row of frame that is not there",
     ),
     "a pose that is none": (
         "UPDATE frame SET pose = zeroblob(96) WHERE idx = 2",
@@ -323,6 +349,71 @@ TAMPERINGS = {
         "UPDATE edit SET at = 'yesterday'",
         "holds 'yesterday' where a moment should be",
     ),
+    "a hull that is gone": (
+        "UPDATE box SET hull = NULL; DELETE FROM hull",
+        "a box of the log has hull [0-9a-f]{64}, which is not there",
+    ),
+    "a hull without its row": (
+        "PRAGMA foreign_keys = OFF; DELETE FROM hull",
+        "a row of box refers to a row of hull that is not there",
+    ),
+    "a hull under another's name": (
+        "UPDATE hull SET vertices = zeroblob(48)",
+        "hull '[0-9a-f]{64}' in the session's database is damaged: it holds another one",
+    ),
+    "a hull with faces of no vertices": (
+        f"UPDATE hull SET faces = x'{'09000000' * 12}'",
+        "hull .* is damaged: .*whole numbers from 0 to 3",
+    ),
+    "a hull cut short": (
+        "UPDATE hull SET faces = x'ff0000'",
+        "hull .* is damaged",
+    ),
+    "a hull that is text": (
+        "UPDATE hull SET vertices = 'round'",
+        "hull.vertices holds a value that is no blob",
+    ),
+    "a hull's making that is none": (
+        "UPDATE box SET hull_options = '{}'",
+        "how a box was made cannot be read",
+    ),
+    "a hull's making changed in the table": (
+        "UPDATE box SET hull_options = replace(hull_options, 'upright', 'free')",
+        "the log and the tables differ in box 2",
+    ),
+    "a hull's name in the log that is none": (
+        """UPDATE edit SET changes = replace(changes, '"hull":"', '"hull":"../')""",
+        "an entry of the session's log cannot be read: a hull is named by 64",
+    ),
+    "a mask moved in the table": (
+        "UPDATE mask SET polygons = replace(polygons, '80.0', '81.0')",
+        "the log and the tables differ in mask",
+    ),
+    "a mask of a frame that is not there": (
+        "UPDATE mask SET frame = 99 WHERE id = 1",
+        "a row of mask refers to a row of frame",
+    ),
+    "a mask of nonsense": (
+        "UPDATE mask SET polygons = '[[1]]' WHERE id = 1",
+        "mask 1 in the session's database is damaged",
+    ),
+    "a mask of an unknown origin": (
+        "UPDATE mask SET origin = 'guessed' WHERE id = 1",
+        "mask 1 in the session's database is damaged: .*not 'guessed'",
+    ),
+    "a mask far outside the image": (
+        "UPDATE mask SET polygons = replace(polygons, '80.0', '9000.0');"
+        " UPDATE edit SET changes = replace(changes, '80.0', '9000.0')",
+        r"mask 1, of object 2 in frame 0: .*image of 640 x 480.*\(9000, ",
+    ),
+    "a mask without an outline in the log": (
+        """UPDATE edit SET changes = replace(changes, '"polygons":[{', '"polygons":[],"more":[{')""",
+        "an entry of the session's log cannot be read: an outline needs at least one polygon",
+    ),
+    "another next mask": (
+        "UPDATE session SET next_mask_id = 1",
+        "differ in next_mask_id",
+    ),
     "another next id": (
         "UPDATE session SET next_box_id = 1",
         "differ in next_box_id",
@@ -338,9 +429,17 @@ def test_a_database_that_was_tampered_with_is_refused(elsewhere: SessionStore, c
         path.write_bytes(b"nothing" * 1000)
     else:
         with closing(sqlite3.connect(path)) as connection:
-            connection.execute(statement)
+            connection.executescript(statement)
             connection.commit()
     assert_refused(elsewhere, carried, BadFile, message)
+
+
+def test_a_session_without_frames_is_refused(store: SessionStore, elsewhere: SessionStore, plain: str, tmp_path: Path):
+    export_session(store, plain, tmp_path / "carried")
+    with closing(sqlite3.connect(tmp_path / "carried" / "session.sqlite")) as connection:
+        connection.execute("DELETE FROM frame")
+        connection.commit()
+    assert_refused(elsewhere, tmp_path / "carried", BadFile, "not numbered from 0 without gaps, or there are none")
 
 
 def test_damaged_pages_are_found(elsewhere: SessionStore, carried: Path):
@@ -364,17 +463,19 @@ def test_archives_are_unpacked_within_limits(elsewhere: SessionStore, carried: P
     assert not (tmp_path / "escaped").exists()
 
 
-@pytest.mark.parametrize("schema", ["0001", "0002"])
+@pytest.mark.parametrize("schema", ["0001", "0002", "0003"])
 def test_an_older_programs_session_is_migrated_on_its_way_in(
     store: SessionStore,
     elsewhere: SessionStore,
-    carried: Path,
-    sid: str,
+    plain: str,
+    tmp_path: Path,
     schema: str,
     made_by_older_program: Callable[[Path, str], None],
 ):
+    carried = tmp_path / "carried"
+    export_session(store, plain, carried)
     made_by_older_program(carried / "session.sqlite", schema)
     imported = import_session(elsewhere, carried)
-    assert differences(elsewhere.state(imported.id), store.state(sid)) == []
+    assert differences(elsewhere.state(imported.id), store.state(plain)) == []
     with closing(sqlite3.connect(elsewhere.folder / imported.id / "session.sqlite")) as connection:
         assert connection.execute("SELECT version_num FROM alembic_version").fetchall() == [(migration.SCHEMA,)]
