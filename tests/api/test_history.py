@@ -7,8 +7,10 @@ from contextlib import contextmanager
 from typing import Any
 
 import httpx
+import numpy as np
 import pytest
 
+from ars_web.geometry.polygon import Polygon
 from ars_web.sessions.editing import SessionEditor
 from ars_web.sessions.store import SessionStore
 
@@ -150,6 +152,31 @@ def test_edits_come_as_they_happen(client: httpx.Client, path: str, box_json: di
         assert stream.next()["data"]["changes"][0]["kind"] == "class"
         client.patch(path, json={"name": "new"}, headers={"If-Match": '"2"'})
         assert stream.next()["data"]["changes"] == [{"kind": "name", "id": None, "before": "scene", "after": "new"}]
+
+
+def test_masks_come_with_their_outlines_and_stay_without_them_in_the_history(
+    server, client: httpx.Client, sid: str, path: str
+) -> None:
+    triangle = Polygon(np.array([[1.0, 2.0], [30.25, 2.0], [30.25, 40.0004]]))
+    editor: SessionEditor = server.services.editor
+    with events(client, path) as stream:
+        stream.next()
+        mask = editor.put_mask(
+            sid, box_id=None, frame=3, class_id=0, polygons=[triangle], expected_revision=None, author="me"
+        )
+        (change,) = stream.next()["data"]["changes"]
+        told = {
+            "id": 1, "box_id": 1, "class_id": 0, "frame": 3, "origin": "drawn", "accepted": True, "revision": 1,
+        }  # fmt: skip
+        outline = {"polygons": [{"outer": [[1.0, 2.0], [30.25, 2.0], [30.25, 40.0]], "holes": []}], "points": 3}
+        assert change == {"kind": "mask", "id": 1, "before": None, "after": {**told, **outline}}
+        editor.delete_mask(sid, mask.id, expected_revision=1, author="me")
+        assert stream.next()["data"]["changes"] == [{"kind": "mask", "id": 1, "before": told, "after": None}]
+    items = client.get(f"{path}/history").json()["items"]
+    assert [item["changes"] for item in items] == [
+        [{"kind": "mask", "id": 1, "before": told, "after": None}],
+        [{"kind": "mask", "id": 1, "before": None, "after": told}],
+    ]
 
 
 def test_what_was_missed_is_replayed(client: httpx.Client, path: str, box_json: dict[str, Any]) -> None:

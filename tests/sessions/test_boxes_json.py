@@ -14,7 +14,8 @@ from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box
 from ars_web.sessions.boxes_json import BoxJson, BoxPatchJson, box_json, class_json, read_boxes_file
 from ars_web.sessions.editing import SessionEditor
-from ars_web.sessions.model import ObjectClass, VirtualBox
+from ars_web.sessions.hull_mesh import HullMesh
+from ars_web.sessions.model import HullOptions, ObjectClass, VirtualBox
 from ars_web.sessions.store import SessionStore
 
 GOOD = {"class_id": 0, "T_world_box": {"position": [0, 0.5, 1], "wxyz": [2, 0, 0, 0]}, "size": [1, 2, 3.5]}
@@ -63,14 +64,27 @@ def test_what_is_written_is_a_unit_quaternion_and_reads_as_the_same_place(
 
 
 def test_a_files_boxes_are_what_the_api_answers(
-    store: SessionStore, editor: SessionEditor, sid: str, a_box: Callable[..., Box], tmp_path: Path
+    store: SessionStore,
+    editor: SessionEditor,
+    sid: str,
+    a_box: Callable[..., Box],
+    a_hull: Callable[..., HullMesh],
+    tmp_path: Path,
 ):
     editor.add_box(sid, class_id=0, box=a_box(), name="left", author="me")
     editor.add_box(sid, class_id=0, box=a_box(1.0), author="me")
+    editor.put_object(
+        sid, box_id=None, class_id=0, box=a_box(2.0), hull=a_hull(), hull_options=HullOptions("free", widen=1.5),
+        author="me",
+    )  # fmt: skip
     listed = [box_json(box) for box in store.state(sid).boxes.values()]
+    assert (listed[2]["has_hull"], listed[2]["hull_options"]) == (
+        True, {"orientation": "free", "position": "box", "widen_px": 1.5, "ground": None},
+    )  # fmt: skip
     (tmp_path / "boxes.json").write_text(json.dumps(listed))
     drafts = read_boxes_file(tmp_path / "boxes.json")
     added = editor.add_boxes(sid, drafts, author="cli")
+    assert [box.hull for box in added] == [None, None, None]
     for before, after in zip(listed, map(box_json, added), strict=True):
         assert after["T_world_box"]["position"] == before["T_world_box"]["position"]
         assert after["T_world_box"]["wxyz"] == pytest.approx(before["T_world_box"]["wxyz"], abs=1e-12)

@@ -14,9 +14,11 @@ from sqlalchemy import create_engine, inspect
 
 from ars_web.errors import StoreError
 from ars_web.geometry.box import Box
+from ars_web.geometry.polygon import Polygon
 from ars_web.sessions import migration, tables
-from ars_web.sessions.editing import SessionEditor
+from ars_web.sessions.editing import MaskDraft, SessionEditor
 from ars_web.sessions.edits import differences
+from ars_web.sessions.hull_mesh import HullMesh
 from ars_web.sessions.model import SessionState
 from ars_web.sessions.store import SessionStore
 
@@ -53,7 +55,13 @@ def dump(path: Path) -> list[str]:
 
 
 def test_an_old_database_is_migrated_when_it_is_opened_and_backed_up_before(
-    store: SessionStore, editor: SessionEditor, sid: str, old: SessionState, a_box: MakeBox
+    store: SessionStore,
+    editor: SessionEditor,
+    sid: str,
+    old: SessionState,
+    a_box: MakeBox,
+    a_hull: Callable[..., HullMesh],
+    outline: Callable[..., tuple[Polygon, ...]],
 ):
     path = store.folder / sid / "session.sqlite"
     before = dump(path)
@@ -61,11 +69,20 @@ def test_an_old_database_is_migrated_when_it_is_opened_and_backed_up_before(
     assert differences(store.state(sid), old) == []
     assert schema(path) == migration.SCHEMA
     assert dump(path.with_name(f"session.sqlite.before-{migration.SCHEMA}")) == before
+    with closing(sqlite3.connect(path)) as connection:
+        columns = {row[1] for row in connection.execute("PRAGMA table_info(box)")}
+    assert {"hull", "hull_options"} < columns
+    assert "has_hull" not in columns  # no box had one
     assert editor.undo(sid, author="me").revision == 3
     assert editor.add_box(sid, class_id=0, box=a_box(), author="me", key="k").revision == 4
     assert sorted(p.name for p in path.parent.iterdir() if not p.name.endswith(("-wal", "-shm"))) == [
         "session.sqlite", f"session.sqlite.before-{migration.SCHEMA}",
     ]  # fmt: skip
+    made = editor.put_object(
+        sid, box_id=None, class_id=0, box=a_box(), hull=a_hull(), hull_options=None, masks=[MaskDraft(0, outline())],
+        author="me",
+    )  # fmt: skip
+    assert (made.has_hull, list(store.state(sid).masks)) == (True, [1])
     assert all("images are not where" in problem for problem in store.check())
 
 
