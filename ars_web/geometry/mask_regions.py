@@ -20,19 +20,42 @@ Operation = Literal["add", "subtract"]
 ROUND_SEGMENTS = 8
 """Of a quarter circle, where a stroke begins, turns and ends."""
 
+MOST_CROSSINGS = 2000
+"""Of an outline with itself."""
+
 SMALLEST_AREA = 1e-6
 """Square pixels. What is smaller is a rounding error of the arithmetic on rings."""
 
 
 def region(polygons: Iterable[Polygon]) -> shapely.MultiPolygon:
-    """What lies inside an odd number of all the polygons' rings; valid, whatever crosses whatever."""
+    """What lies inside an odd number of all the polygons' rings; valid, whatever crosses whatever.
+
+    Raises:
+        BadInput: the rings cross themselves and each other more than MOST_CROSSINGS times.
+    """
     rings = [ring for polygon in polygons for ring in polygon.rings]
     if len(rings) == 1:
         # What people draw, as a rule: nothing to work out.
         simple = shapely.Polygon(rings[0])
         if simple.is_valid:
             return shapely.MultiPolygon([simple])
+    elif not rings:
+        return shapely.MultiPolygon()
+    _refuse_tangles(rings)
     return _of_rings(rings)
+
+
+def _refuse_tangles(rings: Sequence[Float[np.ndarray, "k 2"]]) -> None:
+    """Clipper takes a minute over the pieces of a tangle of a thousand edges, or ends the process."""
+    edges = [np.stack([ring, np.roll(ring, -1, axis=0)], axis=1) for ring in rings]
+    lines = np.asarray(shapely.linestrings(np.concatenate(edges)))
+    tree = shapely.STRtree(lines)
+    crossings = 0
+    for start in range(0, len(lines), 16):
+        # Each is found from both its edges.
+        crossings += tree.query(lines[start : start + 16], predicate="crosses").shape[1] / 2
+        if crossings > MOST_CROSSINGS:
+            raise BadInput(f"the outline crosses itself more than {MOST_CROSSINGS} times; draw it again")
 
 
 def multipolygon(geometry: shapely.Geometry) -> shapely.MultiPolygon:
