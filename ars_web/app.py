@@ -29,12 +29,16 @@ from ars_web.api import (
     frames,
     health,
     history,
+    hull_preview,
+    hulls,
     imports,
     labels_preview,
     live,
     login,
+    masks,
     openapi,
     points,
+    polygons,
     problems,
     scene_door,
     sessions,
@@ -53,6 +57,7 @@ from ars_web.api.telling import TellingViews
 from ars_web.api.websocket_wire import WebsocketWire
 from ars_web.datasets.exports import ExportJobs
 from ars_web.errors import BadInput, StoreError
+from ars_web.masks.boxing import ObjectBoxes
 from ars_web.scene.server import SceneServers
 from ars_web.sessions.editing import SessionEditor
 from ars_web.sessions.import_jobs import ImportJobs
@@ -99,6 +104,10 @@ def create_app(settings: Settings) -> FastAPI:
         labels_preview,
         points,
         boxes,
+        hulls,
+        masks,
+        hull_preview,
+        polygons,
         telling_frames,
         history,
         live,
@@ -138,6 +147,7 @@ def _lifespan(settings: Settings) -> Callable[[FastAPI], AbstractAsyncContextMan
                     app.state.services = Services(
                         store=store,
                         editor=editor,
+                        objects=ObjectBoxes(store, editor),
                         exports=jobs,
                         uploads=uploads,
                         looks=ImportLooks(),

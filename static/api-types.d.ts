@@ -611,6 +611,155 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/sessions/{sid}/boxes/from-masks": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * From Masks
+         * @description Add the box of an object by its outlines in two frames or more: the box round its visual hull, which is stored
+         *     with it, and so are the outlines.
+         *
+         *     Outlines that no one object can have answer 422 (`views-disagree`) with the frames and by how many pixels they are
+         *     off; nothing is stored then.
+         */
+        post: operations["boxes-from-masks"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/boxes/{box_id}/hull": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Hull
+         * @description The hull that is stored with a box, where the box is now; the ETag is the box's.
+         */
+        get: operations["boxes-hull"];
+        /**
+         * Make
+         * @description Make the box of an object from its accepted masks, or make it again.
+         *
+         *     A box that is there must be at the revision in `If-Match`; an object that has masks and no box yet needs none.
+         */
+        put: operations["boxes-make-hull"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/masks": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Masks
+         * @description The session's masks, by id; the ETag is the session's revision.
+         */
+        get: operations["masks-list"];
+        put?: never;
+        /**
+         * Create
+         * @description Add the outline of an object in a frame where it has none.
+         *
+         *     Where the object's box is made from its masks, hull and box follow in the same edit, or nothing is stored.
+         */
+        post: operations["masks-create"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/masks/{mask_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get
+         * @description One mask.
+         */
+        get: operations["masks-get"];
+        /**
+         * Change
+         * @description Change a mask that is at the revision in `If-Match`.
+         *
+         *     Where the object's box is made from its masks, hull and box follow in the same edit, or nothing is stored.
+         */
+        put: operations["masks-change"];
+        post?: never;
+        /**
+         * Delete
+         * @description Delete a mask that is at the revision in `If-Match`; undo brings it back.
+         *
+         *     Where the object's box is made from its masks, hull and box follow in the same edit, or nothing is deleted.
+         */
+        delete: operations["masks-delete"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/hull-preview": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Hull Preview
+         * @description The hull that outlines in one frame or more give, and where that puts the object in other frames. Nothing is
+         *     stored or changed.
+         */
+        post: operations["hull-preview"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/polygons/combine": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Combine
+         * @description An outline with a shape added to it or taken off it, within its image. Nothing is stored or changed.
+         */
+        post: operations["polygons-combine"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/sessions/{sid}/boxes/{box_id}/telling-frames": {
         parameters: {
             query?: never;
@@ -930,6 +1079,51 @@ export interface components {
             revision: number;
         };
         /**
+         * BoxFromMasksJson
+         * @description A box to be made of its object's outlines in two frames or more.
+         */
+        BoxFromMasksJson: {
+            /**
+             * Orientation
+             * @description the box's axes: the world's; upright: turned about the world's z to the smallest area; free: to the smallest volume
+             * @default world
+             * @enum {string}
+             */
+            orientation: "world" | "upright" | "free";
+            /**
+             * Position
+             * @description the box's centre: its own, or the hull's centre of mass
+             * @default box
+             * @enum {string}
+             */
+            position: "box" | "mass";
+            /**
+             * Widen Px
+             * @description how far outlines may be off, pixels: each is widened by it
+             * @default 0
+             */
+            widen_px: number;
+            /**
+             * Ground
+             * @description z of the plane that the object stands on, metres; null: none
+             */
+            ground?: number | null;
+            /** Class Id */
+            class_id: number;
+            /** Views */
+            views: components["schemas"]["ViewJson"][];
+            /**
+             * Name
+             * @description default: the class's name, with a number where it is taken
+             */
+            name?: string | null;
+            /**
+             * Box Id
+             * @description of an object that has masks and no box yet; these outlines take the place of all its masks
+             */
+            box_id?: number | null;
+        };
+        /**
          * BoxFromPointsAnswer
          * @description The box that the points gave.
          */
@@ -1200,6 +1394,31 @@ export interface components {
             id: number;
             /** Name */
             name: string;
+        };
+        /**
+         * CombineDraft
+         * @description An outline, and a shape to add to it or to take off it.
+         */
+        CombineDraft: {
+            /**
+             * Polygons
+             * @description empty: nothing yet
+             */
+            polygons: components["schemas"]["PolygonJson"][];
+            /**
+             * Operation
+             * @enum {string}
+             */
+            operation: "add" | "subtract";
+            /** @description the shape; may cross itself */
+            polygon?: components["schemas"]["PolygonJson"] | null;
+            /** @description or what a brush covers */
+            stroke?: components["schemas"]["StrokeJson"] | null;
+            /**
+             * Frame
+             * @description whose image the outline is in; it ends at that image's border
+             */
+            frame: number;
         };
         /**
          * DuplicateDraft
@@ -1641,6 +1860,71 @@ export interface components {
             can_redo: components["schemas"]["EditName"] | null;
         };
         /**
+         * HullAnswer
+         * @description A visual hull: what the outlines leave of space.
+         */
+        HullAnswer: {
+            /**
+             * Volume
+             * @description cubic metres
+             */
+            volume: number;
+            /**
+             * Centre Of Mass
+             * @description in the world, metres
+             */
+            centre_of_mass: [
+                number,
+                number,
+                number
+            ];
+            /**
+             * Vertices
+             * @description in the world, metres
+             */
+            vertices: [
+                number,
+                number,
+                number
+            ][];
+            /**
+             * Faces
+             * @description rows of vertices, counter-clockwise seen from outside
+             */
+            faces: [
+                number,
+                number,
+                number
+            ][];
+        };
+        /**
+         * HullChangeJson
+         * @description How to make a box of its object's masks; what is not given stays, of a new box at its default.
+         */
+        HullChangeJson: {
+            /** Orientation */
+            orientation?: ("world" | "upright" | "free") | null;
+            /** Position */
+            position?: ("box" | "mass") | null;
+            /** Widen Px */
+            widen_px?: number | null;
+            /**
+             * Ground
+             * @description null: no support plane
+             */
+            ground?: number | null;
+            /**
+             * Class Id
+             * @description default: as it is; of a new box the masks'
+             */
+            class_id?: number | null;
+            /**
+             * Name
+             * @description default: as it is; of a new box after its class
+             */
+            name?: string | null;
+        };
+        /**
          * HullOptionsJson
          * @description How a box and its hull were made from masks.
          */
@@ -1667,6 +1951,50 @@ export interface components {
              * @description z in the world, metres, of a support plane under the object; null: none
              */
             ground: number | null;
+        };
+        /**
+         * HullPreviewAnswer
+         * @description What outlines give.
+         */
+        HullPreviewAnswer: {
+            /** @description null: of one view, or of views that disagree */
+            hull: components["schemas"]["PreviewedHullJson"] | null;
+            /**
+             * Angle Degrees
+             * @description between the two views that are farthest apart; null: no hull
+             */
+            angle_degrees: number | null;
+            /** Overlays */
+            overlays: components["schemas"]["OverlayJson"][];
+            problem: components["schemas"]["PreviewProblemJson"] | null;
+            /**
+             * Warnings
+             * @description what is uncertain, and what to do about it, for the user
+             */
+            warnings: string[];
+        };
+        /**
+         * HullPreviewDraft
+         * @description Outlines, and the frames to see in what they say.
+         */
+        HullPreviewDraft: {
+            /** Views */
+            views: components["schemas"]["ViewJson"][];
+            /**
+             * Widen Px
+             * @default 0
+             */
+            widen_px: number;
+            /** Ground */
+            ground?: number | null;
+            /**
+             * Orientation
+             * @default world
+             * @enum {string}
+             */
+            orientation: "world" | "upright" | "free";
+            /** Show In */
+            show_in?: number[];
         };
         /**
          * ImageCounts
@@ -2016,6 +2344,196 @@ export interface components {
             first: components["schemas"]["SkippedFrameJson"][];
         };
         /**
+         * MadeBoxAnswer
+         * @description The box that outlines gave.
+         */
+        MadeBoxAnswer: {
+            /**
+             * Id
+             * @description never used again
+             */
+            id: number;
+            /** Class Id */
+            class_id: number;
+            /** Name */
+            name: string;
+            /** @description the box's centre and axes in the world */
+            T_world_box: components["schemas"]["TransformAnswer"];
+            /**
+             * Size
+             * @description metres along the box's own axes
+             */
+            size: [
+                number,
+                number,
+                number
+            ];
+            /**
+             * Has Hull
+             * @description whether a visual hull is stored with it
+             */
+            has_hull: boolean;
+            /** @description how it was made from its masks; null: it was not */
+            hull_options: components["schemas"]["HullOptionsJson"] | null;
+            /**
+             * Locked
+             * @description class, place and size stay, and it is not deleted, until it is unlocked
+             */
+            locked: boolean;
+            /**
+             * Revision
+             * @description the session's revision that last changed it
+             */
+            revision: number;
+            hull: components["schemas"]["MadeHullAnswer"];
+        };
+        /**
+         * MadeHullAnswer
+         * @description The hull that a box was made of.
+         */
+        MadeHullAnswer: {
+            /**
+             * Volume
+             * @description cubic metres
+             */
+            volume: number;
+            /**
+             * Centre Of Mass
+             * @description in the world, metres
+             */
+            centre_of_mass: [
+                number,
+                number,
+                number
+            ];
+            /**
+             * Vertices
+             * @description in the world, metres
+             */
+            vertices: [
+                number,
+                number,
+                number
+            ][];
+            /**
+             * Faces
+             * @description rows of vertices, counter-clockwise seen from outside
+             */
+            faces: [
+                number,
+                number,
+                number
+            ][];
+            /**
+             * Position
+             * @description the box's centre: its own, or the hull's centre of mass
+             * @enum {string}
+             */
+            position: "box" | "mass";
+        };
+        /**
+         * MaskAnswer
+         * @description The outline of one object in one frame; its ETag is its revision.
+         */
+        MaskAnswer: {
+            /** Polygons */
+            polygons: components["schemas"]["PolygonAnswer"][];
+            /**
+             * Id
+             * @description never used again
+             */
+            id: number;
+            /**
+             * Box Id
+             * @description the object's box, or the id kept for it while there is none yet
+             */
+            box_id: number;
+            /** Class Id */
+            class_id: number;
+            /** Frame */
+            frame: number;
+            /**
+             * Origin
+             * @description by hand, by the smart tool, or by the program on its own
+             * @enum {string}
+             */
+            origin: "drawn" | "smart" | "proposed";
+            /**
+             * Accepted
+             * @description whether it counts for the hull; else it waits for a yes or a no
+             */
+            accepted: boolean;
+            /**
+             * Points
+             * @description corners, over all rings
+             */
+            points: number;
+            /**
+             * Revision
+             * @description the session's revision that last changed it
+             */
+            revision: number;
+        };
+        /**
+         * MaskChangeJson
+         * @description What of a mask is to change; what is not given stays.
+         */
+        MaskChangeJson: {
+            /**
+             * Polygons
+             * @description what an odd number of their rings enclose is inside; at most 20000 corners in all
+             */
+            polygons?: components["schemas"]["PolygonJson"][] | null;
+            /**
+             * Mask Png
+             * @description base64 of an 8-bit greyscale PNG of the image's size, non-zero inside
+             */
+            mask_png?: string | null;
+            /** Origin */
+            origin?: ("drawn" | "smart" | "proposed") | null;
+            /** Accepted */
+            accepted?: boolean | null;
+        };
+        /**
+         * MaskDraftJson
+         * @description A mask to add.
+         */
+        MaskDraftJson: {
+            /**
+             * Polygons
+             * @description what an odd number of their rings enclose is inside; at most 20000 corners in all
+             */
+            polygons?: components["schemas"]["PolygonJson"][] | null;
+            /**
+             * Mask Png
+             * @description base64 of an 8-bit greyscale PNG of the image's size, non-zero inside
+             */
+            mask_png?: string | null;
+            /**
+             * Box Id
+             * @description the object's; null: of a new object, whose id the answer tells
+             */
+            box_id?: number | null;
+            /**
+             * Class Id
+             * @description the object's
+             */
+            class_id: number;
+            /** Frame */
+            frame: number;
+            /**
+             * Origin
+             * @default drawn
+             * @enum {string}
+             */
+            origin: "drawn" | "smart" | "proposed";
+            /**
+             * Accepted
+             * @default true
+             */
+            accepted: boolean;
+        };
+        /**
          * ObservationJson
          * @description Where the point is seen in a frame; image coordinates of the original image.
          */
@@ -2065,8 +2583,27 @@ export interface components {
             maximum: number | null;
         };
         /**
+         * OverlayJson
+         * @description Where something of the object is in a frame, to an image's size beyond its border.
+         */
+        OverlayJson: {
+            /** Frame */
+            frame: number;
+            /**
+             * Polygons
+             * @description to a hundredth of a pixel
+             */
+            polygons: components["schemas"]["PolygonAnswer"][];
+            /**
+             * Kind
+             * @description band: where the object must lie by the outlines in all other frames; hull: where the hull of all of them is seen
+             * @enum {string}
+             */
+            kind: "band" | "hull";
+        };
+        /**
          * PastEdit
-         * @description One entry of the session's history, as it stands now.
+         * @description One entry of the session's history, as it stands now; its masks are without polygons and points.
          */
         PastEdit: {
             /**
@@ -2208,6 +2745,46 @@ export interface components {
             name?: string | null;
         };
         /**
+         * PolygonAnswer
+         * @description A ring with its holes; image coordinates of the original image, rings not closed.
+         */
+        PolygonAnswer: {
+            /** Outer */
+            outer: [
+                number,
+                number
+            ][];
+            /** Holes */
+            holes: [
+                number,
+                number
+            ][][];
+        };
+        /**
+         * PolygonJson
+         * @description A ring with its holes; image coordinates of the original image, rings not closed.
+         */
+        PolygonJson: {
+            /** Outer */
+            outer: [
+                number,
+                number
+            ][];
+            /** Holes */
+            holes?: [
+                number,
+                number
+            ][][];
+        };
+        /**
+         * PolygonsAnswer
+         * @description An outline; empty where nothing is left of it.
+         */
+        PolygonsAnswer: {
+            /** Polygons */
+            polygons: components["schemas"]["PolygonAnswer"][];
+        };
+        /**
          * PreviewBoxJson
          * @description A box as it would be.
          */
@@ -2260,6 +2837,65 @@ export interface components {
              * @description share of the amodal outline's area outside the image
              */
             truncated: number;
+        };
+        /**
+         * PreviewProblemJson
+         * @description Why outlines in two frames or more give no hull.
+         */
+        PreviewProblemJson: {
+            /** Detail */
+            detail: string;
+            /**
+             * Views
+             * @description those concerned, the worst first
+             */
+            views: components["schemas"]["ViewMisfit"][];
+        };
+        /**
+         * PreviewedBoxJson
+         * @description A box that is not stored.
+         */
+        PreviewedBoxJson: {
+            T_world_box: components["schemas"]["TransformAnswer"];
+            /**
+             * Size
+             * @description metres along the box's own axes
+             */
+            size: [
+                number,
+                number,
+                number
+            ];
+        };
+        /**
+         * PreviewedHullJson
+         * @description A hull that is not stored.
+         */
+        PreviewedHullJson: {
+            /**
+             * Volume
+             * @description cubic metres
+             */
+            volume: number;
+            /**
+             * Size
+             * @description of its box, metres along the box's own axes
+             */
+            size: [
+                number,
+                number,
+                number
+            ];
+            /**
+             * Centre Of Mass
+             * @description in the world, metres
+             */
+            centre_of_mass: [
+                number,
+                number,
+                number
+            ];
+            box: components["schemas"]["PreviewedBoxJson"];
         };
         /**
          * ReaderJson
@@ -2473,6 +3109,25 @@ export interface components {
             };
         };
         /**
+         * StrokeJson
+         * @description The way of a round brush.
+         */
+        StrokeJson: {
+            /**
+             * Points
+             * @description one: a dab
+             */
+            points: [
+                number,
+                number
+            ][];
+            /**
+             * Width
+             * @description pixels
+             */
+            width: number;
+        };
+        /**
          * TellingFrameJson
          * @description A frame in which errors of the box show.
          */
@@ -2561,6 +3216,37 @@ export interface components {
              * @description in the zip
              */
             files: number;
+        };
+        /**
+         * ViewJson
+         * @description The object's outline in one frame.
+         */
+        ViewJson: {
+            /**
+             * Polygons
+             * @description what an odd number of their rings enclose is inside; at most 20000 corners in all
+             */
+            polygons?: components["schemas"]["PolygonJson"][] | null;
+            /**
+             * Mask Png
+             * @description base64 of an 8-bit greyscale PNG of the image's size, non-zero inside
+             */
+            mask_png?: string | null;
+            /** Frame */
+            frame: number;
+        };
+        /**
+         * ViewMisfit
+         * @description One of the views that do not fit together.
+         */
+        ViewMisfit: {
+            /** Frame */
+            frame: number;
+            /**
+             * Misfit Px
+             * @description by how much its outline would have to grow to meet the others, pixels; null: no growing helps
+             */
+            misfit_px: number | null;
         };
         /**
          * WriterJson
@@ -3008,19 +3694,6 @@ export interface components {
             hidden: number[];
             /** Dark */
             dark: boolean;
-        };
-        /**
-         * ViewMisfit
-         * @description One of the views that do not fit together.
-         */
-        ViewMisfit: {
-            /** Frame */
-            frame: number;
-            /**
-             * Misfit Px
-             * @description by how much its outline would have to grow to meet the others, pixels; null: no growing helps
-             */
-            misfit_px: number | null;
         };
         /**
          * ViewsProblem
@@ -6624,6 +7297,1051 @@ export interface operations {
                 };
                 content: {
                     "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "boxes-from-masks": {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description a repeat with the same key answers what the first answered, and does nothing */
+                "idempotency-key"?: string | null;
+            };
+            path: {
+                sid: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["BoxFromMasksJson"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MadeBoxAnswer"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the thing is not in a state that allows this */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description beyond a limit, which the detail names */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ViewsProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "boxes-hull": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                sid: string;
+                box_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HullAnswer"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "boxes-make-hull": {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description the ETag of the thing as it was read */
+                "if-match"?: string | null;
+            };
+            path: {
+                sid: string;
+                box_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["HullChangeJson"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MadeBoxAnswer"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the thing is not in a state that allows this */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description stale `If-Match`; `current` holds the thing as it is now */
+            412: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["StaleProblem"];
+                };
+            };
+            /** @description beyond a limit, which the detail names */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ViewsProblem"];
+                };
+            };
+            /** @description `If-Match` is missing */
+            428: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "masks-list": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                sid: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MaskAnswer"][];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "masks-create": {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description a repeat with the same key answers what the first answered, and does nothing */
+                "idempotency-key"?: string | null;
+            };
+            path: {
+                sid: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["MaskDraftJson"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MaskAnswer"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the thing is not in a state that allows this */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description beyond a limit, which the detail names */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ViewsProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "masks-get": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                sid: string;
+                mask_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MaskAnswer"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "masks-change": {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description the ETag of the thing as it was read */
+                "if-match"?: string | null;
+            };
+            path: {
+                sid: string;
+                mask_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["MaskChangeJson"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MaskAnswer"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the thing is not in a state that allows this */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description stale `If-Match`; `current` holds the thing as it is now */
+            412: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["StaleProblem"];
+                };
+            };
+            /** @description beyond a limit, which the detail names */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ViewsProblem"];
+                };
+            };
+            /** @description `If-Match` is missing */
+            428: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "masks-delete": {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description the ETag of the thing as it was read */
+                "if-match"?: string | null;
+            };
+            path: {
+                sid: string;
+                mask_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the thing is not in a state that allows this */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description stale `If-Match`; `current` holds the thing as it is now */
+            412: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["StaleProblem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ViewsProblem"];
+                };
+            };
+            /** @description `If-Match` is missing */
+            428: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "hull-preview": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                sid: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["HullPreviewDraft"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HullPreviewAnswer"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description beyond a limit, which the detail names */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "polygons-combine": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                sid: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["CombineDraft"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PolygonsAnswer"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description beyond a limit, which the detail names */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
                 };
             };
             /** @description a fault of the server, logged there under the number in the detail */

@@ -20,6 +20,7 @@ from ars_web.api.security import Door
 from ars_web.api.telling import TellingViews
 from ars_web.datasets.exports import ExportJobs
 from ars_web.errors import BadInput
+from ars_web.masks.boxing import ObjectBoxes
 from ars_web.sessions.editing import SessionEditor
 from ars_web.sessions.import_jobs import ImportJobs
 from ars_web.sessions.import_looks import ImportLooks
@@ -34,6 +35,7 @@ class Services:
 
     Attributes:
         looks: recordings that were looked at before their import.
+        objects: makes boxes of masks.
         lines: the live lines that are open.
         presence: who is at which session.
         scene: what the live lines show their pages.
@@ -46,6 +48,7 @@ class Services:
 
     store: SessionStore
     editor: SessionEditor
+    objects: ObjectBoxes
     exports: ExportJobs
     uploads: Uploads
     looks: ImportLooks
@@ -75,18 +78,25 @@ def _author(connection: HTTPConnection) -> str:
     return author
 
 
-def _expected_revision(
+def _optional_revision(
     if_match: Annotated[str | None, Header(description="the ETag of the thing as it was read")] = None,
-) -> int:
-    """The revision in If-Match; -1, which nothing ever has, for any other well-formed tag."""
+) -> int | None:
+    """The revision in If-Match; None without one; -1, which nothing ever has, for any other well-formed tag."""
     if if_match is None:
-        raise PreconditionMissing
+        return None
     tag = if_match.strip()
     if tag == "*" or "," in tag:
         raise BadInput('If-Match must name the one revision that you read, such as "12"')
     digits = tag[1:-1]
     is_revision = tag == f'"{digits}"' and digits.isascii() and digits.isdigit() and len(digits) < 16
     return int(digits) if is_revision else -1
+
+
+def _expected_revision(revision: Annotated[int | None, Depends(_optional_revision)]) -> int:
+    """The revision in If-Match, which must be there."""
+    if revision is None:
+        raise PreconditionMissing
+    return revision
 
 
 def _idempotency_key(
@@ -106,6 +116,7 @@ def _idempotency_key(
 ServicesDep = Annotated[Services, Depends(_services)]
 AuthorDep = Annotated[str, Depends(_author)]
 ExpectedRevision = Annotated[int, Depends(_expected_revision)]
+OptionalRevision = Annotated[int | None, Depends(_optional_revision)]
 IdempotencyKey = Annotated[str | None, Depends(_idempotency_key)]
 
 

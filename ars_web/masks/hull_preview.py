@@ -1,0 +1,137 @@
+"""What outlines give before anything of them is stored: for whoever is drawing, many times a second."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import shapely
+
+from ars_web.errors import ViewsDisagree
+from ars_web.geometry.box import Box
+from ars_web.geometry.hull_box import box_of_hull
+from ars_web.geometry.mask_regions import polygons_of
+from ars_web.geometry.mesh_silhouette import silhouette
+from ars_web.geometry.polygon import Polygon
+from ars_web.geometry.visual_hull import View, VisualHull, angle_between, band, visual_hull
+from ars_web.masks.views import Photographed, camera_of
+from ars_web.sessions.model import HullOptions
+
+SMALL_ANGLE = math.radians(60.0)
+"""Between the two views that are farthest apart, below which the hull is more than 2.7 times too large."""
+
+DEPTHS = 100.0
+"""An object is at most so many times as far from a camera as the recording is wide, and no nearer than that part."""
+
+COARSE = 0.25
+"""Pixels that overlays are simplified to."""
+
+
+@dataclass(frozen=True, eq=False)
+class Overlay:
+    """Where something of the object is in one frame; image coordinates.
+
+    Attributes:
+        kind: `band`: where the object must lie by the outlines in all other frames; `hull`: where the hull of all of
+            them is seen.
+    """
+
+    frame: int
+    polygons: tuple[Polygon, ...]
+    kind: Literal["band", "hull"]
+
+
+@dataclass(frozen=True, eq=False)
+class HullPreview:
+    """What outlines give.
+
+    Attributes:
+        hull, box: None where there are fewer than two views, or they disagree.
+        angle: radians between the two views that are farthest apart; None where there is no hull.
+        problem: why there is none, of two views or more.
+        warnings: what is uncertain and what to do about it, in words.
+    """
+
+    hull: VisualHull | None
+    box: Box | None
+    angle: float | None
+    overlays: tuple[Overlay, ...]
+    problem: ViewsDisagree | None
+    warnings: tuple[str, ...]
+
+
+def preview_hull(
+    taken: Photographed, views: Sequence[View], options: HullOptions, *, show_in: Sequence[int]
+) -> HullPreview:
+    """What outlines in one view or more give, with overlays for the frames of `show_in`.
+
+    Raises:
+        BadInput: an outline encloses nothing of its image, or a frame of `show_in` is not there.
+    """
+    hull, problem = _hull(views, options)
+    angle = None if hull is None else angle_between(views, hull.centre_of_mass)
+    return HullPreview(
+        hull=hull,
+        box=None if hull is None else box_of_hull(hull, orientation=options.orientation, position=options.position),
+        angle=angle,
+        overlays=_overlays(taken, views, options, hull, show_in),
+        problem=problem,
+        warnings=() if angle is None or angle >= SMALL_ANGLE else (_one_sided(angle),),
+    )
+
+
+def _hull(views: Sequence[View], options: HullOptions) -> tuple[VisualHull | None, ViewsDisagree | None]:
+    if len(views) < 2:
+        return None, None
+    try:
+        return visual_hull(views, widen=options.widen, ground=options.ground), None
+    except ViewsDisagree as error:
+        return None, error
+
+
+def _overlays(
+    taken: Photographed, views: Sequence[View], options: HullOptions, hull: VisualHull | None, show_in: Sequence[int]
+) -> tuple[Overlay, ...]:
+    # By the frames of its views. Where a frame has no outline, all others are all.
+    bands: dict[tuple[int, ...], VisualHull | None] = {}
+    if hull is not None:
+        bands[tuple(view.frame for view in views)] = hull
+    overlays: list[Overlay] = []
+    for frame in show_in:
+        others = [view for view in views if view.frame != frame]
+        frames = tuple(view.frame for view in others)
+        if others and frames not in bands:
+            bands[frames] = _band(taken, others, options)
+        overlays += _overlay(taken, frame, bands.get(frames), "band")
+        overlays += _overlay(taken, frame, hull, "hull")
+    return tuple(overlays)
+
+
+def _overlay(taken: Photographed, frame: int, mesh: VisualHull | None, kind: Literal["band", "hull"]) -> list[Overlay]:
+    """One, or none where nothing of it can be seen."""
+    if mesh is None:
+        return []
+    camera = camera_of(taken, frame)
+    region = silhouette(camera, taken.frames.Ts_world_camera[frame], mesh.vertices, mesh.faces)
+    around = shapely.box(-camera.width, -camera.height, 2 * camera.width, 2 * camera.height)
+    polygons = polygons_of(region.intersection(around), tolerance=COARSE)
+    return [Overlay(frame, polygons, kind)] if polygons else []
+
+
+def _band(taken: Photographed, views: Sequence[View], options: HullOptions) -> VisualHull | None:
+    """Where the object may be by these views; None where they disagree."""
+    places = taken.frames.Ts_world_camera[:, :3, 3]
+    reach = float(np.linalg.norm(places - places.mean(axis=0), axis=1).max()) or 1.0
+    try:
+        return band(views, depth=(reach / DEPTHS, reach * DEPTHS), widen=options.widen, ground=options.ground)
+    except ViewsDisagree:
+        return None
+
+
+def _one_sided(angle: float) -> str:
+    degrees = math.degrees(angle)
+    return (
+        f"The outlines see the object from {degrees:.0f} degrees apart at most, so that its depth is uncertain and the"
+        " box too long. Draw it in a frame from further round, too."
+    )
