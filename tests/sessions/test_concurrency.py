@@ -8,8 +8,11 @@ from collections.abc import Callable
 
 from ars_web.errors import Conflict
 from ars_web.geometry.box import Box
+from ars_web.geometry.polygon import Polygon
 from ars_web.sessions.editing import SessionEditor
-from ars_web.sessions.edits import BoxChange, Edit
+from ars_web.sessions.edits import BoxChange, Edit, same
+from ars_web.sessions.hull_mesh import HullMesh
+from ars_web.sessions.model import VirtualBox
 from ars_web.sessions.store import SessionStore
 
 MakeBox = Callable[..., Box]
@@ -103,3 +106,46 @@ def test_processes_racing_for_one_box_lose_nothing(
         racer.communicate(timeout=120)
     assert [racer.returncode for racer in racers] == [0, 0]
     assert_every_step_was_kept(store, sid, 2 * EACH)
+
+
+def test_threads_that_outline_at_once_get_an_object_each_and_make_one_box_of_one(
+    store: SessionStore,
+    editor: SessionEditor,
+    sid: str,
+    a_box: MakeBox,
+    a_hull: Callable[..., HullMesh],
+    outline: Callable[..., tuple[Polygon, ...]],
+):
+    shared = editor.put_mask(
+        sid, box_id=None, frame=0, class_id=0, polygons=outline(), expected_revision=None, author="me"
+    )
+    together = threading.Barrier(6, timeout=30)
+    own: list[int] = []
+    made: list[VirtualBox] = []
+    refused: list[object] = []
+
+    def outline_and_make(author: str) -> None:
+        together.wait()
+        mask = editor.put_mask(
+            sid, box_id=None, frame=1, class_id=0, polygons=outline(), expected_revision=None, author=author
+        )
+        own.append(mask.box_id)
+        try:
+            box = editor.put_object(
+                sid, box_id=shared.box_id, class_id=0, box=a_box(), hull=a_hull(), hull_options=None,
+                expected_masks={shared.id: shared.revision}, author=author,
+            )  # fmt: skip
+            made.append(box)
+        except Conflict as error:
+            refused.append(error.current)
+
+    threads = [threading.Thread(target=outline_and_make, args=(f"t{i}",)) for i in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(60)
+    assert sorted(own) == [2, 3, 4, 5, 6, 7]
+    assert [box.id for box in made] == [1]
+    assert [same(told, made[0]) for told in refused if isinstance(told, VirtualBox)] == [True] * 5
+    assert store.revision(sid) == 8
+    assert all("images are not where" in problem for problem in store.check())
