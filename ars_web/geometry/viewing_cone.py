@@ -139,8 +139,13 @@ def cone_of_mask(
     mask = inside
     if widen > 0:
         mask = multipolygon(inside.buffer(widen, quad_segs=ROUND_SEGMENTS).intersection(seen))
-    simple = simplified(mask)
-    background = multipolygon(seen.difference(simple)) if touches else shapely.MultiPolygon()
+    if touches:
+        # Over the border, so that no strip of background is left there when the outline is simplified.
+        over = mask.buffer(2 * BORDER, quad_segs=1).difference(seen.buffer(-BORDER))
+        simple = multipolygon(simplified(multipolygon(mask.union(over))).intersection(seen))
+        background = multipolygon(seen.difference(simple))
+    else:
+        simple, background = simplified(mask), shapely.MultiPolygon()
     return ViewingCone(
         frame,
         camera,

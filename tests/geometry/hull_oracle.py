@@ -1,4 +1,4 @@
-"""The slow readable version of the visual hull: points are asked one by one, in every image. And scenes to ask it in."""
+"""The slow readable version of the visual hull: points are asked one by one, in every image; and scenes for it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
