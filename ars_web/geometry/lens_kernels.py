@@ -466,7 +466,9 @@ def curves_of_edges(lens: Lens, bends: Array, edges: Array, tolerance: float) ->
             grown = np.empty((2 * len(found) + LONGEST_CURVE, 2))
             grown[:k] = found[:k]
             found = grown
-        xs, ys, xe, ye = x0 + low * (x1 - x0), y0 + low * (y1 - y0), x0 + high * (x1 - x0), y0 + high * (y1 - y0)
+        xs, ys = x0 + low * (x1 - x0), y0 + low * (y1 - y0)
+        # Ends that are not cut stay what they are to the last bit, so that pieces that meet are seen to.
+        xe, ye = (x0 + high * (x1 - x0), y0 + high * (y1 - y0)) if high < 1.0 else (x1, y1)
         bend = polygon_bend(lens, bends, 0, edges[i], 2)
         found[k, 0], found[k, 1] = image_point(lens, xs, ys)
         end = append_curve(lens, bends, bend, xs, ys, xe, ye, tolerance, found, k + 1)

@@ -29,7 +29,7 @@ def labels_of_meshes(
     Raises:
         BadInput: `tolerance` is below FINEST_TOLERANCE.
     """
-    _check_tolerance(tolerance)
+    check_tolerance(tolerance)
     n, b, tables = len(Ts_world_camera), len(meshes), lens_tables(camera)
     found = BoxLabels(np.full((n, b, 4), np.nan), np.full((n, b, 4), np.nan), np.ones((n, b)))
 
@@ -107,7 +107,7 @@ def _settle(
     lens = tables.lens
     truncated[unsettled] = 1.0
     for fineness in (tolerance, max(tolerance / 8.0, FINEST_TOLERANCE), FINEST_TOLERANCE):
-        points, lengths, counts = _curves(tables, Ts_world_camera, mesh, unsettled, fineness)
+        points, lengths, counts = curves_of_mesh(tables, Ts_world_camera, mesh, unsettled, fineness)
         rough = np.zeros(len(unsettled), dtype=np.bool_)
         region_kernels.label_regions(
             lens.width,
@@ -127,7 +127,7 @@ def _settle(
             break
 
 
-def _curves(
+def curves_of_mesh(
     tables: LensTables,
     Ts_world_camera: Float[np.ndarray, "n 4 4"],
     mesh: Mesh,
@@ -153,6 +153,7 @@ def _curves(
     return points, lengths, counts
 
 
-def _check_tolerance(tolerance: float) -> None:
+def check_tolerance(tolerance: float) -> None:
+    """Raises BadInput for a tolerance below FINEST_TOLERANCE."""
     if not tolerance >= FINEST_TOLERANCE:
         raise BadInput(f"a tolerance must be at least {FINEST_TOLERANCE} pixels, not {tolerance}")

@@ -148,12 +148,13 @@ def areas(width: float, height: float, sides: Array) -> tuple[float, float]:
     """
     n = len(sides)
     upper, lower, turns = np.empty(n), np.empty(n), np.empty(n, np.int64)
-    levels = np.empty(2 * n + 2)
+    # Each end of a side is another's start.
+    levels = np.empty(n + 2)
     for i in range(n):
         v0, v1 = sides[i, 1], sides[i, 3]
         upper[i], lower[i], turns[i] = min(v0, v1), max(v0, v1), -1 if v0 > v1 else 1
-        levels[2 * i], levels[2 * i + 1] = v0, v1
-    levels[2 * n], levels[2 * n + 1] = 0.0, height
+        levels[i] = v0
+    levels[n], levels[n + 1] = 0.0, height
     levels.sort()
     order = np.argsort(upper)
     top, bottom, keys = np.empty(n), np.empty(n), np.empty(n)
@@ -199,13 +200,19 @@ def areas(width: float, height: float, sides: Array) -> tuple[float, float]:
             end: float = cuts[cut]
             for i in range(count):
                 side = active[i]
-                keys[side] = top[side] + 0.5 * (start + end) * (bottom[side] - top[side])
+                keys[side] = between(top, bottom, side, 0.5 * (start + end))
             sort_active(keys, active, count)
             found = strip_areas(width, active, count, turns, top, bottom, start, end)
             whole += (vb - va) * found[0]
             inside += (vb - va) * found[1] if seen else 0.0
             start = end
     return whole, inside
+
+
+@part
+def between(top: Array, bottom: Array, side: int, share: float) -> float:
+    """Where a side is some way down a strip."""
+    return top[side] + share * (bottom[side] - top[side])
 
 
 @part
@@ -218,9 +225,7 @@ def strip_areas(
         side = active[i]
         before, level = level, level + turns[side]
         if (before > 0) != (level > 0):
-            along: float = bottom[side] - top[side]
-            ua: float = top[side] + start * along
-            ub: float = top[side] + end * along
+            ua, ub = between(top, bottom, side, start), between(top, bottom, side, end)
             sign = (end - start) * (1.0 if before > 0 else -1.0)
             whole += sign * 0.5 * (ua + ub)
             inside += sign * clamped_mean(ua, ub, width)
@@ -292,3 +297,51 @@ def label_region(
     whole, inside = areas(width, height, sides)
     truncated[row] = min(max(1.0 - inside / whole, 0.0), 1.0) if whole > 0.0 else 0.0
     rough[row] = is_rough(width, height, sides, tolerance, allowed)
+
+
+@entry
+def join_loops(points: Array, lengths: Array, counts: Array) -> tuple[Array, Array, Array]:
+    """The curves of n contours joined where one ends and another begins, to the last bit, until they are closed.
+
+    `points` (k, 2), `lengths` and `counts` (n,) as in `label_regions`. Returns the points of all loops, each loop's
+    number of points, its first not said again, and (n,) how many loops each contour has.
+    """
+    joined, loops, loop_counts = (
+        np.empty_like(points),
+        np.empty(len(lengths), np.int64),
+        np.zeros(len(counts), np.int64),
+    )
+    starts = np.zeros(len(lengths) + 1, np.int64)
+    for i in range(len(lengths)):
+        starts[i + 1] = starts[i] + lengths[i]
+    used = np.zeros(len(lengths), np.bool_)
+    first, k, found = 0, 0, 0
+    for row in range(len(counts)):
+        last = first + counts[row]
+        # Curves by where they begin, so that the next one is found by halving.
+        firsts = points[starts[first:last], 0]
+        order = np.argsort(firsts)
+        firsts = firsts[order]
+        for curve in range(first, last):
+            if used[curve] or lengths[curve] < 2:
+                continue
+            begin, at = k, curve
+            while at >= 0:
+                used[at] = True
+                for i in range(starts[at], starts[at + 1] - 1):
+                    joined[k] = points[i]
+                    k += 1
+                end = points[starts[at + 1] - 1]
+                at = -1
+                for place in range(np.searchsorted(firsts, end[0]), len(firsts)):
+                    if firsts[place] != end[0]:
+                        break
+                    following = first + order[place]
+                    if not used[following] and points[starts[following], 1] == end[1]:
+                        at = following
+                        break
+            loops[found] = k - begin
+            loop_counts[row] += 1
+            found += 1
+        first = last
+    return joined[:k].copy(), loops[:found].copy(), loop_counts
