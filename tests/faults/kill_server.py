@@ -5,8 +5,8 @@
 
 Edits: each round starts the server on the same folder, lets several clients edit at once, and kills it at a random
 moment. The next server must have every acknowledged edit, with what was answered, at its revision; its event stream,
-from the last revision of the round before, must have no gap; boxes and classes must be what those events lead to;
-and a request that was cut off and is repeated with its Idempotency-Key must have been done once.
+from the last revision of the round before, must have no gap; boxes, masks and classes must be what those events lead
+to; and a request that was cut off and is repeated with its Idempotency-Key must have been done once.
 
 Export: the server is killed while it exports; the next one finishes by itself, and each file of the dataset must be
 that of an undisturbed export.
@@ -112,17 +112,44 @@ def server(folder: Path, without: str | None) -> Iterator[Server]:
 # Edits
 
 
+def a_box(chance: random.Random) -> dict[str, Any]:
+    place = {"position": [0, 0, 0], "wxyz": [1, 0, 0, 0]}
+    return {"class_id": 0, "T_world_box": place, "size": [chance.uniform(0.01, 1) for _ in range(3)]}
+
+
+def a_mask(chance: random.Random) -> dict[str, Any]:
+    """Of a new object; in thousandths of a pixel, as the server keeps them."""
+    corners = [[chance.randrange(32_000) / 1000, chance.randrange(24_000) / 1000] for _ in range(3)]
+    polygons = [{"outer": corners, "holes": []}]
+    return {"box_id": None, "class_id": 0, "frame": chance.randrange(2), "polygons": polygons}
+
+
+@dataclass(frozen=True)
+class CutOff:
+    """A request to add something that was not answered."""
+
+    key: str
+    address: str
+    body: dict[str, Any]
+
+    def is_of(self, change: dict[str, Any]) -> bool:
+        """Whether the change is what the request asked for."""
+        after = change["after"] or {}
+        part = "size" if change["kind"] == "box" else "polygons"
+        return change["before"] is None and part in self.body and after.get(part) == self.body[part]
+
+
 @dataclass
 class Client:
     """One client's own memory: what was acknowledged, and the request that was cut off."""
 
     acknowledged: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
-    cut_off: tuple[str, dict[str, Any]] | None = None
+    cut_off: CutOff | None = None
 
     def edit(self, url: str, sid: str, seed: int) -> None:
         """Edit until the server is gone."""
         chance = random.Random(seed)
-        mine: list[dict[str, Any]] = []
+        mine: dict[str, list[dict[str, Any]]] = {"boxes": [], "masks": []}
         headers = {"Authorization": f"Bearer {TOKEN}"}
         with httpx.Client(base_url=url, headers=headers, timeout=PATIENCE) as client:
             try:
@@ -131,34 +158,39 @@ class Client:
             except httpx.TransportError:
                 return
 
-    def edit_once(self, client: httpx.Client, path: str, mine: list[dict[str, Any]], chance: random.Random) -> None:
-        size = [chance.uniform(0.01, 1) for _ in range(3)]
+    def edit_once(
+        self, client: httpx.Client, path: str, mine: dict[str, list[dict[str, Any]]], chance: random.Random
+    ) -> None:
         action = chance.choice(["add", "add", "add", "change", "change", "delete", "undo", "redo"])
+        kind = chance.choice(list(mine))
+        one_is_there = mine[kind] != []
         if action in ("undo", "redo"):
             answer = client.post(f"{path}/{action}")
             if answer.status_code == 200:
                 self.acknowledged.append({"revision": answer.json()["revision"], "edit": answer.json()})
-        elif action == "add" or not mine:
-            place = {"position": [0, 0, 0], "wxyz": [1, 0, 0, 0]}
-            body = {"class_id": 0, "T_world_box": place, "size": size, "name": uuid.uuid4().hex}
-            self.cut_off = (f"{path}/boxes", body)
-            answer = client.post(f"{path}/boxes", json=body, headers={"Idempotency-Key": body["name"]})
+        elif action == "add" or not one_is_there:
+            cut = CutOff(uuid.uuid4().hex, f"{path}/{kind}", a_box(chance) if kind == "boxes" else a_mask(chance))
+            self.cut_off = cut
+            answer = client.post(cut.address, json=cut.body, headers={"Idempotency-Key": cut.key})
             assert answer.status_code == 201, answer.text
             self.cut_off = None
-            mine.append(answer.json())
+            mine[kind].append(answer.json())
             self.acknowledged.append({"revision": answer.json()["revision"], "after": answer.json()})
         else:
-            box = mine.pop(chance.randrange(len(mine)))
-            one, tag = f"{path}/boxes/{box['id']}", {"If-Match": f'"{box["revision"]}"'}
+            thing = mine[kind].pop(chance.randrange(len(mine[kind])))
+            one, tag = f"{path}/{kind}/{thing['id']}", {"If-Match": f'"{thing["revision"]}"'}
             if action == "change":
-                answer = client.patch(one, json={"size": size}, headers=tag)
+                if kind == "boxes":
+                    answer = client.patch(one, json={"size": a_box(chance)["size"]}, headers=tag)
+                else:
+                    answer = client.put(one, json={"polygons": a_mask(chance)["polygons"]}, headers=tag)
                 if answer.status_code == 200:  # else another client's undo took it
-                    mine.append(answer.json())
+                    mine[kind].append(answer.json())
                     self.acknowledged.append({"revision": answer.json()["revision"], "after": answer.json()})
             else:
                 answer = client.delete(one, headers=tag)
                 if answer.status_code == 204:
-                    self.acknowledged.append({"deleted": box})
+                    self.acknowledged.append({"deleted": thing, "kind": kind})
 
 
 @dataclass
@@ -168,7 +200,12 @@ class Session:
     id: str
     revision: int = 0
     boxes: dict[int, Any] = field(default_factory=dict[int, Any])
+    masks: dict[int, Any] = field(default_factory=dict[int, Any])
     classes: dict[int, Any] = field(default_factory=dict[int, Any])
+
+    def things(self, kind: str) -> dict[int, Any]:
+        """Those that a kind of change is about."""
+        return {"box": self.boxes, "mask": self.masks, "class": self.classes}[kind]
 
 
 def edit_and_kill(running: Server, session: Session, chance: random.Random) -> list[Client]:
@@ -193,8 +230,8 @@ def look(http: httpx.Client, session: Session, clients: list[Client]) -> None:
     path = f"/api/sessions/{session.id}"
     # What was cut off is repeated first: done before or not, it is done once now.
     repeated = [cut for client in clients if (cut := client.cut_off) is not None]
-    for address, body in repeated:
-        answer = http.post(address, json=body, headers={"Idempotency-Key": body["name"]})
+    for cut in repeated:
+        answer = http.post(cut.address, json=cut.body, headers={"Idempotency-Key": cut.key})
         if answer.status_code != 201:
             raise Lost(f"repeating what was cut off: {answer.text}")
     newest = http.get(path).json()["revision"]
@@ -206,34 +243,41 @@ def look(http: httpx.Client, session: Session, clients: list[Client]) -> None:
             found(told, edits, newest)
     for edit in edits.values():
         for change in edit["changes"]:
-            things = session.boxes if change["kind"] == "box" else session.classes
-            if change["before"] != things.get(change["id"]):
+            things = session.things(change["kind"])
+            if change["before"] != without_outline(things.get(change["id"])):
                 raise Lost(f"revision {edit['revision']} does not follow from what was before it")
             if change["after"] is None:
                 del things[change["id"]]
             else:
                 things[change["id"]] = change["after"]
     session.revision = newest
-    for part, things in (("boxes", session.boxes), ("classes", session.classes)):
+    for part, things in (("boxes", session.boxes), ("masks", session.masks), ("classes", session.classes)):
         if http.get(f"{path}/{part}").json() != [things[i] for i in sorted(things)]:
             raise Lost(f"{part} are not what the events up to revision {newest} lead to")
-    added = [
-        change["after"]["name"]
+    done = [
+        change
         for edit in edits.values()
         for change in edit["changes"]
-        if edit["undoes"] is None and edit["redoes"] is None and change["kind"] == "box" and change["before"] is None
+        if edit["undoes"] is None and edit["redoes"] is None
     ]
-    for _, body in repeated:
-        if added.count(body["name"]) != 1:
-            raise Lost(f"what was cut off and repeated was done {added.count(body['name'])} times")
+    for cut in repeated:
+        times = sum(cut.is_of(change) for change in done)
+        if times != 1:
+            raise Lost(f"what was cut off and repeated was done {times} times")
+
+
+def without_outline(thing: dict[str, Any] | None) -> dict[str, Any] | None:
+    """As events tell of what was there before: a mask is without its outline."""
+    return None if thing is None else {k: v for k, v in thing.items() if k not in ("polygons", "points")}
 
 
 def found(told: dict[str, Any], edits: dict[int, Any], newest: int) -> None:
     """Raises Lost where what a client was told is not in the log."""
     if "deleted" in told:
-        gone = [change for edit in edits.values() for change in edit["changes"] if change["before"] == told["deleted"]]
-        if not any(change["after"] is None for change in gone):
-            raise Lost(f"the deletion of box {told['deleted']['id']} was acknowledged and is not in the log")
+        before, kind = without_outline(told["deleted"]), {"boxes": "box", "masks": "mask"}[told["kind"]]
+        changes = [change for edit in edits.values() for change in edit["changes"] if change["kind"] == kind]
+        if not any(change["before"] == before and change["after"] is None for change in changes):
+            raise Lost(f"the deletion of {kind} {told['deleted']['id']} was acknowledged and is not in the log")
         return
     edit = edits.get(told["revision"])
     if edit is None:
