@@ -46,11 +46,12 @@ async function load() {
   const sid = store.sid.value;
   // The session first: edits made while the rest is read come again over the line, and change nothing twice.
   const session = await api.session(sid);
-  const [boxes, classes] = await Promise.all([api.boxes(sid), api.classes(sid)]);
+  const [boxes, classes, masks] = await Promise.all([api.boxes(sid), api.classes(sid), api.masks(sid)]);
   batch(() => {
     store.session.value = session;
     store.boxes.value = new Map(boxes.map((box) => [box.id, box]));
     store.classes.value = new Map(classes.map((one) => [one.id, one]));
+    store.masks.value = new Map(masks.map((mask) => [mask.id, mask]));
     store.revision.value = session.revision;
     if (!store.isObject(store.selected.value ?? -1)) store.selected.value = null;
   });

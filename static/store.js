@@ -15,28 +15,15 @@ import { computed, signal } from "./lib/view.js";
 /** @typedef {Schemas["ExportJson"]} Export */
 /** @typedef {{position: [number, number, number], wxyz: [number, number, number, number]}} Transform */
 /** @typedef {[number, number]} Corner in image coordinates of the original image */
-/** @typedef {{outer: Corner[], holes: Corner[][]}} Polygon */
-/** @typedef {"drawn" | "smart" | "proposed"} MaskOrigin */
+/** @typedef {Schemas["PolygonAnswer"]} Polygon */
+/** An object's outline in one frame. Its box may not be made yet. @typedef {Schemas["MaskAnswer"]} Mask */
+/** @typedef {Mask["origin"]} MaskOrigin */
 
-/**
- * An object's outline in one frame. Its box may not be made yet; `accepted` false: it waits for a yes or a no.
- * @typedef {{id: number, box_id: number, class_id: number, frame: number, polygons: Polygon[], origin: MaskOrigin, accepted: boolean, revision: number}} Mask
- */
-
-/** How a hull is made of masks: lengths in metres, `widen_px` by how much each mask is widened. @typedef {{orientation: "world" | "upright" | "free", widen_px: number, ground: number | null}} HullOptions */
+/** How a hull is made of masks. @typedef {Omit<Schemas["HullOptionsJson"], "position">} HullOptions */
 /** @typedef {{frame: number, polygons: readonly Polygon[]}} MaskView */
 /** What an object looks like in one frame, as far as a person has said. @typedef {{rectangle?: [number, number, number, number], inside?: Corner[][], outside?: Corner[][], brush_width?: number, start?: Polygon[]}} SegmentPrompt */
 
-/**
- * What outlines give, before anything of it is stored; metres.
- * @typedef {object} HullPreview
- * @property {{volume: number, size: [number, number, number], centre_of_mass: [number, number, number], box: {T_world_box: Transform, size: [number, number, number]}} | null} hull
- * @property {number | null} angle_degrees between the two views that are farthest apart
- * @property {{frame: number, polygons: Polygon[], kind: "band" | "hull"}[]} overlays
- * @property {{detail: string, views: {frame: number, misfit_px: number | null}[]} | null} problem
- * @property {string[]} warnings
- * @property {{frame: number, degrees: number, reason: string} | null} next_view
- */
+/** What outlines give, before anything of it is stored. @typedef {Schemas["HullPreviewAnswer"] & {next_view?: {frame: number, degrees: number, reason: string} | null}} HullPreview */
 
 /**
  * Masks being made by the server in further frames.

@@ -26,6 +26,8 @@ const POINTER = [
   ["Step a number; ten times; a tenth", "Arrows; Shift; Alt"],
 ];
 
+const GROUPS = /** @type {const} */ (["View", "Frames", "Tools", "Masks", "Box", "Session"]);
+
 function Nudges() {
   return html`<div><dt>Nudge by 1 mm; turn by 0.2° with Rotate</dt><dd><kbd>Arrows</kbd><kbd>PgUp</kbd><kbd>PgDn</kbd></dd></div>
     <div><dt>Ten times as far</dt><dd><kbd>Shift</kbd> and these</dd></div>`;
@@ -33,11 +35,10 @@ function Nudges() {
 
 export function Help() {
   const close = () => (store.overlay.value = null);
-  const groups = [...new Set(commands.map((one) => one.group))];
   return html`<${Dialog} label="Keys" onClose=${close} class="wide">
     <header><h2>Keys</h2><button class="button quiet icon-only" aria-label="Close" onClick=${close}><${Icon} name="x" /></button></header>
     <div class="body key-list">
-      ${groups.map(
+      ${GROUPS.map(
         (group) => html`<section key=${group}>
           <h3 class="heading">${group}</h3>
           <dl>${commands
