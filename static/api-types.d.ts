@@ -557,7 +557,7 @@ export interface paths {
         post?: never;
         /**
          * Delete
-         * @description Delete a box that is at the revision in `If-Match`, unless it is locked; undo brings it back.
+         * @description Delete a box that is at the revision in `If-Match`, and its masks, unless it is locked; undo brings them back.
          */
         delete: operations["boxes-delete"];
         options?: never;
@@ -582,7 +582,7 @@ export interface paths {
         put?: never;
         /**
          * Duplicate
-         * @description Add a box like another, next to it, with the next free name; it is not locked.
+         * @description Add a box like another, next to it, with its hull and the next free name; it has no masks and is not locked.
          */
         post: operations["boxes-duplicate"];
         delete?: never;

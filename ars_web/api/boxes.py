@@ -97,7 +97,7 @@ def change(
 
 @router.delete("/{box_id}", status_code=204, operation_id="boxes-delete", responses=documented(404, 409, 412, 428))
 def delete(sid: str, box_id: int, services: ServicesDep, author: AuthorDep, expected: ExpectedRevision) -> None:
-    """Delete a box that is at the revision in `If-Match`, unless it is locked; undo brings it back."""
+    """Delete a box that is at the revision in `If-Match`, and its masks, unless it is locked; undo brings them back."""
     services.editor.delete_box(sid, box_id, expected_revision=expected, author=author)
 
 
@@ -111,7 +111,7 @@ def duplicate(
     key: IdempotencyKey,
     draft: DuplicateDraft = BESIDE,
 ) -> BoxAnswer:
-    """Add a box like another, next to it, with the next free name; it is not locked."""
+    """Add a box like another, next to it, with its hull and the next free name; it has no masks and is not locked."""
     made = services.editor.duplicate_box(sid, box_id, author=author, key=key)
     _headers(response, sid, made, created=True)
     return BoxAnswer.of(made)
