@@ -16,15 +16,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ars_web import arguments as take
-from ars_web import kernel_cache
-from ars_web.errors import ArsError, BadFile, BadInput
-from ars_web.terminal import has_screen, note, open_browser, print_json, print_table, progress, write_json
+from ars_web import box_commands, kernel_cache
+from ars_web.errors import ArsError
+from ars_web.terminal import has_screen, note, open_browser, print_json, print_table, progress
 
 if TYPE_CHECKING:
     from ars_web.recordings.recording import SkippedFrame
-
-AUTHOR = "cli"
-"""Who the edit log says made the changes of this program."""
 
 INTERRUPTED = 130
 """Exit status after Ctrl-C, as shells count it: 128 + SIGINT."""
@@ -43,8 +40,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"max_content_width": 120},
 )
-boxes_app = typer.Typer(help="A session's virtual boxes, in and out as JSON.", rich_markup_mode=None)
-app.add_typer(boxes_app, name="boxes")
+app.add_typer(box_commands.app, name="boxes")
 
 
 @app.callback(invoke_without_command=True)
@@ -181,54 +177,6 @@ def list_sessions(sessions: take.Sessions = take.SESSIONS, as_json: take.Json = 
         return
     columns = ("id", "name", "format", "frames", "skipped", "classes", "boxes", "revision", "changed")
     print_table(columns, [[*(getattr(s, c) for c in columns[:-1]), f"{s.changed:%Y-%m-%d %H:%M}"] for s in found])
-
-
-@boxes_app.command("import")
-def import_boxes(
-    session: take.Session,
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="JSON list of boxes, as the API answers it.")],
-    sessions: take.Sessions = take.SESSIONS,
-    as_json: take.Json = False,
-) -> None:
-    """Add all boxes of a file, as one step that one undo takes back."""
-    from ars_web.sessions.boxes_json import box_json, read_boxes_file
-    from ars_web.sessions.editing import SessionEditor
-    from ars_web.sessions.store import SessionStore
-
-    with SessionStore(sessions) as store:
-        sid, drafts = store.find(session), read_boxes_file(file)
-        try:
-            added = SessionEditor(store).add_boxes(sid, drafts, author=AUTHOR)
-        except BadInput as error:
-            raise BadFile(file, f"{error}; boxes are counted from 0") from error
-    if as_json:
-        print_json([box_json(box) for box in added])
-    else:
-        print(f"{len(added)} boxes added")
-
-
-@boxes_app.command("export")
-def export_boxes(
-    session: take.Session,
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="Where the JSON list goes; - for stdout.")],
-    force: take.Force = False,
-    sessions: take.Sessions = take.SESSIONS,
-) -> None:
-    """Write a session's boxes as the JSON list that the API answers."""
-    from ars_web.sessions.boxes_json import box_json
-    from ars_web.sessions.store import SessionStore
-
-    with SessionStore(sessions) as store:
-        boxes = [box_json(box) for box in store.state(store.find(session)).boxes.values()]
-    if str(file) == "-":
-        print_json(boxes)
-        return
-    if file.exists() and not force:
-        raise BadInput(f"{file} exists already: name another file, or replace it with --force")
-    if not file.parent.is_dir():
-        raise BadInput(f"{file} cannot be written: there is no folder {file.parent}; make it first")
-    write_json(file, boxes)
-    note(f"{len(boxes)} boxes in {file}")
 
 
 @app.command()

@@ -1,7 +1,5 @@
 """`/api/sessions/{sid}/boxes/from-masks` and `boxes/{box_id}/hull`: boxes of outlines, and their visual hulls."""
 
-from typing import Any
-
 from fastapi import APIRouter, Response
 
 from ars_web.api.dependencies import (
@@ -14,13 +12,11 @@ from ars_web.api.dependencies import (
     StrictRoute,
     etag,
 )
-from ars_web.api.mask_models import HullAnswer, HullChangeJson, MadeBoxAnswer, hull_json
+from ars_web.api.mask_models import HullAnswer, HullChangeJson, MadeBoxAnswer
 from ars_web.api.problems import PreconditionMissing, documented
 from ars_web.errors import NotFound
-from ars_web.geometry.visual_hull import VisualHull
-from ars_web.masks.masks_json import BoxFromMasksJson, outlines_of
-from ars_web.masks.views import photographs
-from ars_web.sessions.boxes_json import box_json
+from ars_web.masks.masks_json import BoxFromMasksJson, hull_json, made_box_json, outlines_of
+from ars_web.masks.views import hull_of, photographs
 from ars_web.sessions.model import HullOptions, VirtualBox
 
 router = APIRouter(prefix="/api/sessions/{sid}/boxes", tags=["boxes"], route_class=StrictRoute)
@@ -45,10 +41,7 @@ def from_masks(
     made = services.objects.from_masks(
         sid,
         outlines_of(photographs(services.store, sid), draft.views),
-        class_id=draft.class_id,
-        options=draft.options,
-        name=draft.name,
-        box_id=draft.box_id,
+        **draft.asked,
         author=author,
         key=key,
     )
@@ -61,9 +54,7 @@ def hull(sid: str, box_id: int, services: ServicesDep) -> Response:
     box = services.store.state(sid).boxes.get(box_id)
     if box is None:
         raise NotFound(f"session {sid} has no box {box_id}")
-    if box.hull is None:
-        raise NotFound(f"box {box_id} ({box.name!r}) has no hull: it was not made from masks")
-    answer = JsonResponse(hull_json(_hull(services, sid, box)))
+    answer = JsonResponse(hull_json(hull_of(services.store, sid, box)))
     answer.headers["ETag"] = etag(box.revision)
     return answer
 
@@ -102,15 +93,9 @@ def make(
 
 
 def _made(services: Services, sid: str, box: VirtualBox, *, status: int) -> Response:
-    assert box.hull_options is not None
-    hull: dict[str, Any] = {**hull_json(_hull(services, sid, box)), "position": box.hull_options.position}
-    answer = JsonResponse({**box_json(box), "hull": hull}, status_code=status)
+    hull = hull_of(services.store, sid, box)
+    answer = JsonResponse(made_box_json(box, hull), status_code=status)
     answer.headers["ETag"] = etag(box.revision)
     if status == 201:
         answer.headers["Location"] = f"/api/sessions/{sid}/boxes/{box.id}"
     return answer
-
-
-def _hull(services: Services, sid: str, box: VirtualBox) -> VisualHull:
-    assert box.hull is not None
-    return VisualHull(*services.store.hull(sid, box.hull).in_world(box.box))

@@ -8,7 +8,6 @@ from pydantic import BaseModel, Field
 
 from ars_web.api.models import BoxAnswer, Name, Strict
 from ars_web.geometry.polygon import Polygon
-from ars_web.geometry.visual_hull import VisualHull
 from ars_web.masks.masks_json import Height, MaybeOutlineJson, OutlineJson, Widening
 from ars_web.sessions.boxes_json import Flag, Id
 from ars_web.sessions.model import HullOptions, Orientation, Origin, Position
@@ -98,16 +97,6 @@ class HullChangeJson(Strict):
             widen=before.widen if self.widen_px is None else self.widen_px,
             ground=self.ground if "ground" in self.model_fields_set else before.ground,
         )
-
-
-def hull_json(hull: VisualHull) -> dict[str, Any]:
-    """The hull as HullAnswer has it."""
-    return {
-        "volume": hull.volume,
-        "centre_of_mass": hull.centre_of_mass.tolist(),
-        "vertices": hull.vertices.tolist(),
-        "faces": hull.faces.tolist(),
-    }
 
 
 def rounded_polygons_json(polygons: Sequence[Polygon], *, decimals: int = 3) -> list[dict[str, Any]]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, Any, Self, TypedDict
 
 import cv2
 import numpy as np
@@ -14,10 +14,11 @@ from ars_web.geometry.box import FARTHEST
 from ars_web.geometry.camera import Camera
 from ars_web.geometry.mask_regions import polygons_from_mask
 from ars_web.geometry.polygon import Polygon
+from ars_web.geometry.visual_hull import VisualHull
 from ars_web.masks.mask_png import LONGEST_BASE64, mask_from_base64
 from ars_web.masks.views import Photographed, camera_of
-from ars_web.sessions.boxes_json import Id, Name
-from ars_web.sessions.model import WIDEST, HullOptions, Orientation, Position
+from ars_web.sessions.boxes_json import Id, Name, box_json
+from ars_web.sessions.model import WIDEST, HullOptions, Orientation, Position, VirtualBox
 from ars_web.sessions.outlines import FARTHEST as FARTHEST_PIXEL
 from ars_web.sessions.outlines import MOST_CORNERS, MOST_RINGS
 from ars_web.sessions.strict_json import first_fault, place_text, strict_json
@@ -124,6 +125,15 @@ class HullDraftJson(_Strict):
         return HullOptions(self.orientation, self.position, self.widen_px, self.ground)
 
 
+class BoxRequest(TypedDict):
+    """What `ObjectBoxes.from_masks` takes beside the outlines."""
+
+    class_id: int
+    options: HullOptions
+    name: str | None
+    box_id: int | None
+
+
 class BoxFromMasksJson(HullDraftJson):
     """A box to be made of its object's outlines in two frames or more."""
 
@@ -133,6 +143,11 @@ class BoxFromMasksJson(HullDraftJson):
     box_id: Id | None = Field(
         None, description="of an object that has masks and no box yet; these outlines take the place of all its masks"
     )
+
+    @property
+    def asked(self) -> BoxRequest:
+        """All but the outlines, as `ObjectBoxes.from_masks` takes it."""
+        return {"class_id": self.class_id, "options": self.options, "name": self.name, "box_id": self.box_id}
 
 
 def outlines_of(taken: Photographed, views: Sequence[ViewJson]) -> list[tuple[int, tuple[Polygon, ...]]]:
@@ -174,3 +189,19 @@ def read_masks_file(path: Path | str, data: bytes) -> list[BoxFromMasksJson]:
                 path, f"object {place[0]}{':' if not where else f', {where}:'} {message}; counted from 0"
             ) from error
         raise BadFile(path, f"{where}: {message}" if where else message) from error
+
+
+def hull_json(hull: VisualHull) -> dict[str, Any]:
+    """A hull as the API answers it; metres, in the world."""
+    return {
+        "volume": hull.volume,
+        "centre_of_mass": hull.centre_of_mass.tolist(),
+        "vertices": hull.vertices.tolist(),
+        "faces": hull.faces.tolist(),
+    }
+
+
+def made_box_json(box: VirtualBox, hull: VisualHull) -> dict[str, Any]:
+    """A box that was made of outlines, as the API answers it."""
+    assert box.hull_options is not None
+    return {**box_json(box), "hull": {**hull_json(hull), "position": box.hull_options.position}}

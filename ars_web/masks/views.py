@@ -4,14 +4,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from ars_web.errors import BadInput
+from ars_web.errors import BadInput, NotFound
 from ars_web.geometry.box import Box
 from ars_web.geometry.camera import Camera
 from ars_web.geometry.hull_box import box_of_hull
 from ars_web.geometry.polygon import Polygon
-from ars_web.geometry.visual_hull import View, visual_hull
+from ars_web.geometry.visual_hull import View, VisualHull, visual_hull
 from ars_web.sessions.hull_mesh import HullMesh
-from ars_web.sessions.model import FrameTable, HullOptions
+from ars_web.sessions.model import FrameTable, HullOptions, VirtualBox
 from ars_web.sessions.outlines import checked_polygons
 from ars_web.sessions.store import SessionStore
 
@@ -85,3 +85,14 @@ def object_of(views: Sequence[View], options: HullOptions) -> tuple[Box, HullMes
     hull = visual_hull(views, widen=options.widen, ground=options.ground)
     box = box_of_hull(hull, orientation=options.orientation, position=options.position)
     return box, HullMesh.of(hull.vertices, hull.faces, box)
+
+
+def hull_of(store: SessionStore, sid: str, box: VirtualBox) -> VisualHull:
+    """The hull that is stored with a box, where that is.
+
+    Raises:
+        NotFound: it has none.
+    """
+    if box.hull is None:
+        raise NotFound(f"box {box.id} ({box.name!r}) has no hull: it was not made from masks")
+    return VisualHull(*store.hull(sid, box.hull).in_world(box.box))

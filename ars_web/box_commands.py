@@ -1,0 +1,116 @@
+"""The commands of `ars-web boxes`: a session's virtual boxes in, out, and made from outlines."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ars_web import arguments as take
+from ars_web.errors import BadFile, BadInput, Conflict, Locked, NotFound
+from ars_web.terminal import note, print_json, print_table, write_json
+
+if TYPE_CHECKING:
+    from ars_web.geometry.visual_hull import VisualHull
+    from ars_web.sessions.model import VirtualBox
+
+AUTHOR = "cli"
+"""Who the edit log says made the changes of this program."""
+
+app = typer.Typer(help="A session's virtual boxes: in and out as JSON, or made from masks.", rich_markup_mode=None)
+
+
+@app.command("import")
+def import_boxes(
+    session: take.Session,
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="JSON list of boxes, as the API answers it.")],
+    sessions: take.Sessions = take.SESSIONS,
+    as_json: take.Json = False,
+) -> None:
+    """Add all boxes of a file, as one step that one undo takes back."""
+    from ars_web.sessions.boxes_json import box_json, read_boxes_file
+    from ars_web.sessions.editing import SessionEditor
+    from ars_web.sessions.store import SessionStore
+
+    with SessionStore(sessions) as store:
+        sid, drafts = store.find(session), read_boxes_file(file)
+        try:
+            added = SessionEditor(store).add_boxes(sid, drafts, author=AUTHOR)
+        except BadInput as error:
+            raise BadFile(file, f"{error}; boxes are counted from 0") from error
+    if as_json:
+        print_json([box_json(box) for box in added])
+    else:
+        print(f"{len(added)} boxes added")
+
+
+@app.command("from-masks")
+def boxes_from_masks(
+    session: take.Session,
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="JSON as POST boxes/from-masks takes it, or a list; - for stdin.")
+    ],
+    sessions: take.Sessions = take.SESSIONS,
+    as_json: take.Json = False,
+) -> None:
+    """Make boxes from outlines of objects in two frames or more; each is one step that one undo takes back.
+
+    An object whose outlines do not fit is left out, and said so at the end; the others are made.
+    """
+    from ars_web.masks.boxing import ObjectBoxes
+    from ars_web.masks.masks_json import made_box_json, outlines_of, read_masks_file
+    from ars_web.masks.views import hull_of, photographs
+    from ars_web.sessions.editing import SessionEditor
+    from ars_web.sessions.store import SessionStore
+
+    source = "standard input" if str(file) == "-" else file
+    made: list[tuple[VirtualBox, VisualHull, int]] = []
+    refused: list[BadFile] = []
+    with SessionStore(sessions) as store:
+        sid = store.find(session)
+        objects = read_masks_file(source, sys.stdin.buffer.read() if source != file else file.read_bytes())
+        taken, maker = photographs(store, sid), ObjectBoxes(store, SessionEditor(store))
+        for i, wanted in enumerate(objects):
+            try:
+                box = maker.from_masks(sid, outlines_of(taken, wanted.views), **wanted.asked, author=AUTHOR)
+            except (BadInput, NotFound, Conflict, Locked) as error:
+                refused.append(BadFile(source, f"object {i}: {error}" if len(objects) > 1 else str(error)))
+            else:
+                made.append((box, hull_of(store, sid, box), len(wanted.views)))
+    if as_json:
+        print_json([made_box_json(box, hull) for box, hull, _ in made])
+    elif made:
+        rows = [(box.id, box.name, masks, _millimetres(box), f"{1e6 * hull.volume:.2f}") for box, hull, masks in made]
+        print_table(("id", "name", "masks", "size, mm", "hull, cm3"), rows)
+    for error in refused[:-1]:
+        note(f"ars-web: {error}")
+    if refused:
+        raise refused[-1]
+
+
+@app.command("export")
+def export_boxes(
+    session: take.Session,
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Where the JSON list goes; - for stdout.")],
+    force: take.Force = False,
+    sessions: take.Sessions = take.SESSIONS,
+) -> None:
+    """Write a session's boxes as the JSON list that the API answers."""
+    from ars_web.sessions.boxes_json import box_json
+    from ars_web.sessions.store import SessionStore
+
+    with SessionStore(sessions) as store:
+        boxes = [box_json(box) for box in store.state(store.find(session)).boxes.values()]
+    if str(file) == "-":
+        print_json(boxes)
+        return
+    if file.exists() and not force:
+        raise BadInput(f"{file} exists already: name another file, or replace it with --force")
+    if not file.parent.is_dir():
+        raise BadInput(f"{file} cannot be written: there is no folder {file.parent}; make it first")
+    write_json(file, boxes)
+    note(f"{len(boxes)} boxes in {file}")
+
+
+def _millimetres(box: "VirtualBox") -> str:
+    return " x ".join(f"{1000 * side:.1f}" for side in box.box.size)
