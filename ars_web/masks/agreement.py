@@ -6,7 +6,7 @@ left in front of some of their pixels. What is lost there tells it from one that
 beside the object.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -17,6 +17,10 @@ from ars_web.masks.close_up import Cells, CloseUp
 
 CUTS_NOTHING = 0.02
 """The share of another outline that one may cut away: what two careful outlines differ by."""
+
+
+Outline = tuple[Cells, Bool[np.ndarray, "r c"]]
+"""A close-up in squares, and those inside an outline."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +53,7 @@ class Bench:
         self.shots = shots
         self.points = points
         self.cells: dict[int, Cells] = {frame: shot.cells(spacing) for frame, shot in shots.items()}
-        self.drawn_cells: dict[int, tuple[Cells, Bool[np.ndarray, "r c"]]] = {}
+        self.drawn_cells: dict[int, Outline] = {}
         for frame, (shot, mask) in drawn.items():
             cells = shot.cells(spacing)
             self.drawn_cells[frame] = (cells, cells.of_mask(mask))
@@ -64,26 +68,52 @@ class Bench:
                 kept &= left
         return kept
 
-    def agreement(self, found: Mapping[int, Bool[np.ndarray, "h w"]]) -> Agreement:
-        """Take proposals in one by one, those that take least off the drawn outlines first, as long as none of those
-        taken in before loses more than CUTS_NOTHING."""
+    def agreement(self, found: Mapping[int, Bool[np.ndarray, "h w"]], *, trust: Mapping[int, float]) -> Agreement:
+        """Which proposals contradict neither the drawn outlines nor each other: of the sets that can be taken
+        together, the one that is trusted most.
+
+        An outline that is too small cuts most of the others, and one that is too large is cut by most of them: a set
+        with either in it stays small. Sets are begun with each proposal that none of those before has in it.
+        """
         left = {frame: self.shots[frame].within(_grown(mask)) for frame, mask in found.items()}
+        masks = {frame: (self.cells[frame], self.cells[frame].of_mask(mask)) for frame, mask in found.items()}
+        everything = np.ones(len(self.points), dtype=np.bool_)
+        drawn_cut = {frame: self._cut(self.drawn_cells, everything, left[frame])[0] for frame in found}
+        sound = sorted((f for f in found if drawn_cut[f] <= CUTS_NOTHING), key=lambda f: (-trust[f], drawn_cut[f], f))
+        best = self._together(sound, masks, left)
+        tried = set(best.accepted)
+        for first in sound:
+            if first in tried:
+                continue
+            other = self._together([first, *(frame for frame in sound if frame != first)], masks, left)
+            tried.update(other.accepted)
+            if sum(trust[frame] for frame in other.accepted) > sum(trust[frame] for frame in best.accepted):
+                best = other
+        return best
+
+    def _together(
+        self,
+        sound: Sequence[int],
+        masks: Mapping[int, Outline],
+        left: Mapping[int, Bool[np.ndarray, "n"]],
+    ) -> Agreement:
+        """Take outlines in one by one, as long as they cut nothing of the drawn ones and of those taken in before."""
         kept = np.ones(len(self.points), dtype=np.bool_)
         shown = dict(self.drawn_cells)
-        order = sorted(found, key=lambda frame: (self._cut(shown, kept, kept & left[frame])[0], frame))
         accepted: list[int] = []
-        for frame in order:
+        for frame in sound:
             after = kept & left[frame]
-            if self._cut(shown, kept, after)[0] <= CUTS_NOTHING:
+            own = {frame: masks[frame]}
+            if max(self._cut(shown, kept, after)[0], self._cut(own, left[frame], after)[0]) <= CUTS_NOTHING:
                 accepted.append(frame)
                 kept = after
-                shown[frame] = (self.cells[frame], self.cells[frame].of_mask(found[frame]))
-        cuts = {frame: self._cut(shown, kept, kept & left[frame]) for frame in found if frame not in accepted}
+                shown[frame] = masks[frame]
+        cuts = {frame: self._cut(shown, kept, kept & left[frame]) for frame in left if frame not in accepted}
         return Agreement(tuple(accepted), kept, {frame: left[frame] for frame in accepted}, cuts)
 
     def _cut(
         self,
-        shown: Mapping[int, tuple[Cells, Bool[np.ndarray, "r c"]]],
+        shown: Mapping[int, Outline],
         before: Bool[np.ndarray, "n"],
         after: Bool[np.ndarray, "n"],
     ) -> tuple[float, int]:

@@ -80,8 +80,8 @@ class CloseUp:
         """Where the points are, in pixels of the close-up; whether the photograph shows them; and their depths."""
         seen = rigid_transform.transform_points(rigid_transform.invert(self.T_world_camera), self.points)
         image = image_from_pixels(pixels_from_camera_points(self.camera, seen))
-        shown = np.isfinite(image).all(axis=1)
-        shown[shown] &= ((image[shown] >= 0) & (image[shown] < (self.camera.width, self.camera.height))).all(axis=1)
+        # NaN is within nothing.
+        shown = ((image >= 0) & (image < (self.camera.width, self.camera.height))).all(axis=1)
         return (image - (self.x0, self.y0)) * self.scale, shown, seen[:, 2]
 
     @cached_property

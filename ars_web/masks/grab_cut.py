@@ -111,7 +111,7 @@ def cut(image: UInt8[np.ndarray, "h w 3"], trimap: UInt8[np.ndarray, "h w"], *, 
     # In Lab, shade and light on one surface differ in one channel of three.
     image = cv2.cvtColor(image, cv2.COLOR_BGR2LAB)
     background, foreground = np.zeros((1, 65)), np.zeros((1, 65))
-    cv2.grabCut(image, trimap, None, background, foreground, iterations, cv2.GC_INIT_WITH_MASK)
+    cv2.grabCut(image, trimap, (0, 0, 1, 1), background, foreground, iterations, cv2.GC_INIT_WITH_MASK)
 
 
 def without_flecks(
@@ -124,9 +124,7 @@ def without_flecks(
     if kept is not None:
         stays[np.unique(pieces[kept])] = True
     stays[0] = False
-    _, holes, hole_stats, _ = cv2.connectedComponentsWithStats(
-        (~stays[pieces]).astype(np.uint8), connectivity=4
-    )
+    _, holes, hole_stats, _ = cv2.connectedComponentsWithStats((~stays[pieces]).astype(np.uint8), connectivity=4)
     small = hole_stats[:, cv2.CC_STAT_AREA] < SMALLEST_PIECE * areas[1:].max(initial=1) / 4
     small[0] = False
     return stays[pieces] | small[holes]

@@ -44,10 +44,14 @@ CUTS_LITTLE = 0.06
 EDGES_AGREE = 0.5
 """The share of an outline along which the photograph must have an edge."""
 
+EDGES_COUNT = 8
+"""How an outline is trusted: the share of it that has an edge, to this power, as if it were right where so many places
+of it are."""
+
 SEEN_SMALLER = 0.8
 """The share of an outline that must be left by all others."""
 
-STOPS_CHANGING = 0.01
+STOPS_CHANGING = 0.002
 """The share of the hull that a further outline, or another round, must take off to be worth it."""
 
 ROUNDS_MOST = 3
@@ -149,7 +153,7 @@ def _rounds(
 ) -> tuple[dict[int, Bool[np.ndarray, "h w"]], Agreement]:
     """Proposals of the last round, by frame, and how they stand to each other; `possible` becomes narrower."""
     found: dict[int, Bool[np.ndarray, "h w"]] = {}
-    agreement = bench.agreement(found)
+    agreement = bench.agreement(found, trust={})
     for _ in range(ROUNDS_MOST):
         before = int(agreement.kept.sum())
         found = {}
@@ -158,7 +162,8 @@ def _rounds(
             if mask is not None:
                 found[frame] = mask
             steps.advance()
-        agreement = bench.agreement(found)
+        trust = {frame: edge_agreement(bench.shots[frame], mask) ** EDGES_COUNT for frame, mask in found.items()}
+        agreement = bench.agreement(found, trust=trust)
         if before - int(agreement.kept.sum()) < STOPS_CHANGING * before:
             break
         for frame, cells in bench.cells.items():
@@ -208,7 +213,7 @@ def _sorted_out(
         chosen.append(best)
         sound.remove(best)
     for frame in sound:
-        dropped[frame] = "it agrees with the others, and would change the hull by less than 1 %"
+        dropped[frame] = "it agrees with the others, and would hardly change the hull"
 
     def view(frame: int) -> View:
         shot = bench.shots[frame]
@@ -255,7 +260,7 @@ def _points_within(
     for view in drawn:
         seen = transform_points(invert(view.T_world_camera), points)
         image = image_from_pixels(pixels_from_camera_points(view.camera, seen))
-        known = np.isfinite(image).all(axis=1)
+        known: Bool[np.ndarray, "n"] = np.isfinite(image).all(axis=1)
         inside = ~known
         shown = image[known]
         area = region(view.polygons).buffer(widen)
