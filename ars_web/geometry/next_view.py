@@ -19,7 +19,7 @@ from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box
 from ars_web.geometry.labels import labels_of_boxes
 from ars_web.geometry.occlusion import visible_fractions
-from ars_web.geometry.view_guess import PROBED, FrameRows, Guess, by_camera, evenly, shows
+from ars_web.geometry.view_guess import FrameRows, Guess, by_camera, evenly, shows
 
 DIRECTIONS = 384
 """From the object's middle, in which it is asked how far the cones reach."""
@@ -94,10 +94,10 @@ def suggest_views(
         raise BadInput("where the object may be must be guessed, to suggest frames")
     free = np.ones(len(frames), dtype=bool) if allowed is None else allowed.copy()
     free[list(drawn)] = False
-    search = _Search.of(guesses, frames, others)
+    search = _Search(guesses, frames, others)
     before, chosen = list(drawn), list[SuggestedView]()
     while len(chosen) < count:
-        found = search.best(np.flatnonzero(free), before)
+        found = search.best(free, before)
         if found is None:
             break
         chosen.append(found)
@@ -106,70 +106,63 @@ def suggest_views(
     return chosen
 
 
-@dataclass(frozen=True, eq=False)
 class _Search:
-    """Where an object may be, and how its labels are judged.
+    """Where an object may be, which frames show it there, and how its labels are judged."""
 
-    Attributes:
-        models: of the likelier guesses, the likeliest first.
-        weights: of these, 1 together.
-        others: boxes that may hide the object.
-    """
-
-    frames: FrameRows
-    models: list["_Model"]
-    weights: Float[np.ndarray, "g"]
-    others: Sequence[Box]
-
-    @classmethod
-    def of(cls, guesses: Sequence[Guess], frames: FrameRows, others: Sequence[Box]) -> "_Search":
+    def __init__(self, guesses: Sequence[Guess], frames: FrameRows, others: Sequence[Box]) -> None:
         likely = sorted(guesses, key=lambda guess: -guess.weight)
-        likely = [guess for guess in likely if guess.weight >= LIGHTEST * likely[0].weight]
-        weights = np.array([guess.weight for guess in likely])
-        return cls(frames, [_Model.of(guess, frames) for guess in likely], weights / weights.sum(), others)
+        self._guesses = [guess for guess in likely if guess.weight >= LIGHTEST * likely[0].weight]
+        weights = np.array([guess.weight for guess in self._guesses])
+        self._weights = weights / weights.sum()
+        self._frames = frames
+        self._others = others
+        self._rows, self._shown = self._showing(evenly(np.arange(len(frames)), SEARCHED // len(self._guesses)))
+        if not len(self._rows):
+            self._rows, self._shown = self._showing(np.arange(len(frames)))
+        judges = [self._rows[shown] for shown in self._shown]
+        self._models = [_Model.of(*pair, frames) for pair in zip(self._guesses, judges, strict=True)]
 
-    def best(self, rows: Int[np.ndarray, "n"], before: Sequence[int]) -> SuggestedView | None:
-        """The best of the rows; None where none shows the object. With nothing drawn before, the one that a second
-        frame would do most for."""
-        some, shown = self._shown(evenly(rows, SEARCHED // len(self.models)))
+    def best(self, free: Bool[np.ndarray, "n"], before: Sequence[int]) -> SuggestedView | None:
+        """The best of the free frames; None where none shows the object. With nothing drawn before, the one that a
+        second frame would do most for."""
+        among = free[self._rows]
+        some, shown = self._rows[among], self._shown[:, among]
         if not len(some):
-            some, shown = self._shown(rows)
+            some, shown = self._showing(np.flatnonzero(free))
         if not len(some):
             return None
         if not len(before):
             return self._first(some, shown)
-        tried = evenly(np.arange(len(some)), LOOKED_AT // len(self.models))
+        tried = evenly(np.arange(len(some)), LOOKED_AT // len(self._guesses))
         frames, worth = some[tried], self._worth(some[tried], shown[:, tried], before)
         best = int(np.argmax(worth))
         low, high = frames[max(best - 1, 0)], frames[min(best + 1, len(frames) - 1)]
-        near = np.setdiff1d(evenly(rows[(rows >= low) & (rows <= high)], LOOKED_NEAR), frames)
-        near, shown = self._shown(near)
+        near = evenly(np.arange(low, high + 1)[free[low : high + 1]], LOOKED_NEAR)
+        near, shown = self._showing(np.setdiff1d(near, frames))
         frames, worth = np.append(frames, near), np.append(worth, self._worth(near, shown, before))
         best = int(np.argmax(worth))
-        guess = self.models[0].guess
-        angle = _nearest_side(guess, before, int(frames[best]), self.frames)
+        angle = _nearest_side(self._guesses[0], before, int(frames[best]), self._frames)
         return SuggestedView(int(frames[best]), angle, float(worth[best]))
 
     def _first(self, rows: Int[np.ndarray, "k"], shown: Bool[np.ndarray, "g k"]) -> SuggestedView:
         few = evenly(np.arange(len(rows)), PAIRED)
         rows, shown = rows[few], shown[:, few]
         best = [float(self._worth(rows, shown, [row]).max()) for row in rows.tolist()]
-        seen = _unhidden(self.frames, rows, self.models[0].guess, self.others)
-        worth = np.array(best) * seen
+        worth = np.array(best) * _unhidden(self._frames, rows, self._guesses[0], self._others)
         return SuggestedView(int(rows[int(np.argmax(worth))]), math.nan, float(worth.max()))
 
-    def _shown(self, rows: Int[np.ndarray, "n"]) -> tuple[Int[np.ndarray, "k"], Bool[np.ndarray, "g k"]]:
+    def _showing(self, rows: Int[np.ndarray, "n"]) -> tuple[Int[np.ndarray, "k"], Bool[np.ndarray, "g k"]]:
         """Those of the rows that likely show the object, and whether they do for each guess."""
-        shown = np.array([shows(self.frames, rows, model.guess) for model in self.models])
-        likely = self.weights @ shown >= LIKELY
+        shown = np.array([shows(self._frames, rows, guess) for guess in self._guesses])
+        likely = self._weights @ shown >= LIKELY
         return rows[likely], shown[:, likely]
 
     def _worth(
         self, rows: Int[np.ndarray, "k"], shown: Bool[np.ndarray, "g k"], before: Sequence[int]
     ) -> Float[np.ndarray, "k"]:
         """How much labels would agree if each row was drawn, less where something hides the object there."""
-        each = [model.agreements(self.frames, before, rows, shown[i]) for i, model in enumerate(self.models)]
-        return self.weights @ np.array(each) * _unhidden(self.frames, rows, self.models[0].guess, self.others)
+        each = [model.agreements(self._frames, before, rows, shown[i]) for i, model in enumerate(self._models)]
+        return self._weights @ np.array(each) * _unhidden(self._frames, rows, self._guesses[0], self._others)
 
 
 def _unhidden(
@@ -183,9 +176,8 @@ def _unhidden(
     box = Box(rigid_transform.from_rotation(np.eye(3), guess.centre_world), np.full(3, side))
     for camera_id, these in by_camera(frames, rows):
         camera, Ts = frames.by_id[camera_id], frames.Ts_world_camera[rows[these]]
-        bbox = np.full((len(these), 1 + len(others), 4), np.nan)
-        bbox[:, :1] = labels_of_boxes(camera, Ts, [box]).bbox
-        shares = visible_fractions(camera, Ts, [box, *others], bbox)[:, 0]
+        boxes = [box, *others]
+        shares = visible_fractions(camera, Ts, boxes, labels_of_boxes(camera, Ts, boxes).bbox)[:, 0]
         seen[these] = np.where(np.isnan(shares), 1.0, shares)
     return seen
 
@@ -213,11 +205,10 @@ class _Model:
     ball: Float[np.ndarray, "a"]
 
     @classmethod
-    def of(cls, guess: Guess, frames: FrameRows) -> "_Model":
-        """Judged by frames that show the ball, or by all where none does."""
-        rows = evenly(np.arange(len(frames)), PROBED)
-        shown = rows[shows(frames, rows, guess)]
-        Ts = frames.Ts_world_camera[evenly(shown if len(shown) else rows, JUDGES)]
+    def of(cls, guess: Guess, shown: Int[np.ndarray, "k"], frames: FrameRows) -> "_Model":
+        """Judged by some of the frames that show the ball; by some of all where none does."""
+        judges = shown if len(shown) else np.arange(len(frames))
+        Ts = frames.Ts_world_camera[evenly(judges, JUDGES)]
         z = guess.centre_world - Ts[:, :3, 3]
         z /= np.linalg.norm(z, axis=1, keepdims=True)
         y = np.cross(z, Ts[:, :3, 0])
