@@ -1656,7 +1656,7 @@ export interface components {
             options: components["schemas"]["ExportOptions"];
             /**
              * Shape
-             * @description what the labels are outlines of: box
+             * @description what the labels are drawn round: box, hull, or `hull or box` where some have no hull
              */
             shape: string;
             /** Sessions */
@@ -1967,6 +1967,8 @@ export interface components {
             /** Overlays */
             overlays: components["schemas"]["OverlayJson"][];
             problem: components["schemas"]["PreviewProblemJson"] | null;
+            /** @description null: no frame would add to it, or the views disagree */
+            next_view: components["schemas"]["NextViewJson"] | null;
             /**
              * Warnings
              * @description what is uncertain, and what to do about it, for the user
@@ -2532,6 +2534,21 @@ export interface components {
              * @default true
              */
             accepted: boolean;
+        };
+        /**
+         * NextViewJson
+         * @description The frame in which to draw the object next.
+         */
+        NextViewJson: {
+            /** Frame */
+            frame: number;
+            /**
+             * Degrees
+             * @description to the nearest side from which it is drawn already
+             */
+            degrees: number;
+            /** Reason */
+            reason: string;
         };
         /**
          * ObservationJson

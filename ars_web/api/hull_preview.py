@@ -10,6 +10,7 @@ from ars_web.api.dependencies import JsonResponse, ServicesDep, StrictRoute
 from ars_web.api.mask_models import PolygonAnswer, Triple, rounded_polygons_json
 from ars_web.api.models import Strict, TransformAnswer
 from ars_web.api.problems import ViewMisfit, documented, misfits_json
+from ars_web.geometry.next_view import SuggestedView
 from ars_web.masks.hull_preview import HullPreview, preview_hull
 from ars_web.masks.masks_json import Height, ViewJson, Widening, outlines_of
 from ars_web.masks.views import photographs, views_of
@@ -68,6 +69,14 @@ class PreviewProblemJson(BaseModel):
     views: list[ViewMisfit] = Field(description="those concerned, the worst first")
 
 
+class NextViewJson(BaseModel):
+    """The frame in which to draw the object next."""
+
+    frame: int
+    degrees: float = Field(description="to the nearest side from which it is drawn already")
+    reason: str
+
+
 class HullPreviewAnswer(BaseModel):
     """What outlines give."""
 
@@ -75,6 +84,7 @@ class HullPreviewAnswer(BaseModel):
     angle_degrees: float | None = Field(description="between the two views that are farthest apart; null: no hull")
     overlays: list[OverlayJson]
     problem: PreviewProblemJson | None
+    next_view: NextViewJson | None = Field(description="null: no frame would add to it, or the views disagree")
     warnings: list[str] = Field(description="what is uncertain, and what to do about it, for the user")
 
 
@@ -112,5 +122,15 @@ def _json(preview: HullPreview) -> dict[str, Any]:
             for one in preview.overlays
         ],
         "problem": None if problem is None else {"detail": str(problem), "views": misfits_json(problem)},
+        "next_view": None if preview.next_view is None else _next_view(preview.next_view),
         "warnings": list(preview.warnings),
+    }
+
+
+def _next_view(found: SuggestedView) -> dict[str, Any]:
+    degrees = math.degrees(found.angle)
+    return {
+        "frame": found.frame,
+        "degrees": degrees,
+        "reason": f"frame {found.frame} sees it from {degrees:.0f} degrees beside what is drawn, and narrows it most",
     }

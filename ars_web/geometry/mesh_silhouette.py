@@ -1,5 +1,7 @@
 """Where a mesh is seen in an image: the region that its triangles cover together, bent as the lens does."""
 
+import math
+
 import numpy as np
 import shapely
 from jaxtyping import Float, Int
@@ -27,10 +29,13 @@ def silhouette(
     T_world_camera: Transform,
     vertices_world: Float[np.ndarray, "v 3"],
     faces: Int[np.ndarray, "f 3"],
+    *,
+    reach: float = math.inf,
 ) -> shapely.MultiPolygon:
     """The region of image coordinates, not cut to the image, that a mesh (v, 3), (f, 3) of any kind covers.
 
-    What is nearer than NEAR before the camera, behind it or beyond the lens's valid radius is not seen.
+    What is nearer than NEAR before the camera, behind it or beyond the lens's valid radius is not seen. What is beyond
+    `reach` in the normalised plane is left out: far outside the image there is much to bend and nothing to see.
     """
     points = rigid_transform.transform_points(rigid_transform.invert(T_world_camera), vertices_world)
     points, faces = _beyond_near(points, faces)
@@ -43,7 +48,7 @@ def silhouette(
     # Clipper keeps eight decimals: pixels, so that they are enough for a long lens, too.
     scale = camera.fx
     section = CrossSection([np.ascontiguousarray(flat[loop] * scale) for loop in loops], FillRule.NonZero)
-    rim = FARTHEST_OUT * camera.valid_radius
+    rim = min(FARTHEST_OUT * camera.valid_radius, reach)
     if np.linalg.norm(flat, axis=1).max() > rim:
         angles = np.linspace(0.0, 2 * np.pi, RIM_SAMPLES, endpoint=False)
         section = section ^ CrossSection([rim * scale * np.column_stack([np.cos(angles), np.sin(angles)])])

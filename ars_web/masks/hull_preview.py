@@ -8,12 +8,15 @@ from typing import Literal
 import numpy as np
 import shapely
 
-from ars_web.errors import ViewsDisagree
+from ars_web.errors import BadInput, ViewsDisagree
 from ars_web.geometry.box import Box
+from ars_web.geometry.camera import Camera, normalised_from_pixels, pixels_from_image
 from ars_web.geometry.hull_box import box_of_hull
-from ars_web.geometry.mask_regions import polygons_of
+from ars_web.geometry.mask_regions import multipolygon, polygons_of
 from ars_web.geometry.mesh_silhouette import silhouette
+from ars_web.geometry.next_view import SuggestedView, suggest_views
 from ars_web.geometry.polygon import Polygon
+from ars_web.geometry.view_guess import FrameRows, guess_of_hull, guesses_of_view
 from ars_web.geometry.visual_hull import View, VisualHull, angle_between, band, visual_hull
 from ars_web.masks.views import Photographed, camera_of
 from ars_web.sessions.model import HullOptions
@@ -23,6 +26,12 @@ SMALL_ANGLE = math.radians(60.0)
 
 DEPTHS = 100.0
 """An object is at most so many times as far from a camera as the recording is wide, and no nearer than that part."""
+
+AROUND = 2.0
+"""Radii of the image up to which overlays are told, so that their ends are not seen in it."""
+
+SPECK = 1.0
+"""Square pixels. Smaller pieces of overlays are left out: they come of rounding, where a silhouette is thin."""
 
 COARSE = 0.25
 """Pixels that overlays are simplified to."""
@@ -50,6 +59,7 @@ class HullPreview:
         hull, box: None where there are fewer than two views, or they disagree.
         angle: radians between the two views that are farthest apart; None where there is no hull.
         problem: why there is none, of two views or more.
+        next_view: the frame to draw next; None where none would do more, or the views disagree.
         warnings: what is uncertain and what to do about it, in words.
     """
 
@@ -58,6 +68,7 @@ class HullPreview:
     angle: float | None
     overlays: tuple[Overlay, ...]
     problem: ViewsDisagree | None
+    next_view: SuggestedView | None
     warnings: tuple[str, ...]
 
 
@@ -77,6 +88,7 @@ def preview_hull(
         angle=angle,
         overlays=_overlays(taken, views, options, hull, show_in),
         problem=problem,
+        next_view=None if problem is not None else _next_view(taken, views, hull),
         warnings=() if angle is None or angle >= SMALL_ANGLE else (_one_sided(angle),),
     )
 
@@ -113,10 +125,19 @@ def _overlay(taken: Photographed, frame: int, mesh: VisualHull | None, kind: Lit
     if mesh is None:
         return []
     camera = camera_of(taken, frame)
-    region = silhouette(camera, taken.frames.Ts_world_camera[frame], mesh.vertices, mesh.faces)
+    T_world_camera = taken.frames.Ts_world_camera[frame]
+    region = silhouette(camera, T_world_camera, mesh.vertices, mesh.faces, reach=AROUND * _corner_radius(camera))
     around = shapely.box(-camera.width, -camera.height, 2 * camera.width, 2 * camera.height)
-    polygons = polygons_of(region.intersection(around), tolerance=COARSE)
+    seen = [part for part in multipolygon(region.intersection(around)).geoms if part.area >= SPECK]
+    polygons = polygons_of(shapely.MultiPolygon(seen), tolerance=COARSE)
     return [Overlay(frame, polygons, kind)] if polygons else []
+
+
+def _corner_radius(camera: Camera) -> float:
+    """How far the image reaches in the normalised plane."""
+    corners = np.array([[0, 0], [camera.width, 0], [camera.width, camera.height], [0, camera.height]], dtype=np.float64)
+    radii = np.linalg.norm(normalised_from_pixels(camera, pixels_from_image(corners)), axis=1)
+    return float(radii.max()) if np.isfinite(radii).all() else camera.valid_radius
 
 
 def _band(taken: Photographed, views: Sequence[View], options: HullOptions) -> VisualHull | None:
@@ -127,6 +148,16 @@ def _band(taken: Photographed, views: Sequence[View], options: HullOptions) -> V
         return band(views, depth=(reach / DEPTHS, reach * DEPTHS), widen=options.widen, ground=options.ground)
     except ViewsDisagree:
         return None
+
+
+def _next_view(taken: Photographed, views: Sequence[View], hull: VisualHull | None) -> SuggestedView | None:
+    rows = FrameRows(taken.cameras, taken.frames.camera_ids, taken.frames.Ts_world_camera)
+    try:
+        guesses = guesses_of_view(views[0], rows) if hull is None else guess_of_hull(hull)
+    except BadInput:
+        return None  # no other frame shows what is drawn
+    found = suggest_views(guesses, [view.frame for view in views], rows)
+    return found[0] if found else None
 
 
 def _one_sided(angle: float) -> str:
