@@ -17,7 +17,7 @@
 
 import { fitted, imageFromPane, kept, paneFromImage, revealed, shifted, within, zoomed } from "./image_view.js";
 import { watchGestures } from "./pane_gestures.js";
-import { paintImage, paintLoupe, paintOverlay } from "./pane_painting.js";
+import { paintBrush, paintImage, paintLoupe, paintOverlay } from "./pane_painting.js";
 
 /** @typedef {import("./image_view.js").Place} Place */
 /** @typedef {import("./image_view.js").View} View */
@@ -28,16 +28,27 @@ import { paintImage, paintLoupe, paintOverlay } from "./pane_painting.js";
 /**
  * What happens in the pane. Places are in image coordinates, and within the image.
  * @typedef {object} PaneEvents
- * @property {(at: Place) => void} [onClick]
+ * @property {(at: Place, event: Modifiers) => void} [onClick] also by Enter, at the crosshair
  * @property {(at: Place, event: PointerEvent) => {move: (at: Place) => void, end: (at: Place) => void, cancel: () => void} | null} [onPress]
  *   who answers with something takes the drag, instead of a click or a pan: to draw, for example
  * @property {(id: string, to: Place, phase: "move" | "end" | "cancel") => void} [onMovePoint]
  *   by dragging or by keys; at `cancel`, back to where it was. Without it points stay where they are
+ * @property {(id: string, to: Place) => void} [onStepPoint] by keys; without it, `onMovePoint` at `end`
  * @property {(id: string) => void} [onChoosePoint] it was pressed
+ * @property {(id: string, event: Modifiers) => void} [onClickPoint] it was pressed and let go where it was
+ * @property {(at: Place) => void} [onDoubleClick] after its two clicks
+ * @property {(at: Place | null, by: "pointer" | "finger" | "keys") => void} [onHover] where the pointer or the crosshair is now
  * @property {(view: View) => void} [onView] zoomed or panned
  */
 
-/** How near to a point a press means it, CSS pixels; a finger is less exact. */
+/** @typedef {{altKey: boolean, shiftKey: boolean}} Modifiers */
+
+/**
+ * @typedef {object} PaneOptions
+ * @property {"always" | "fingers"} [loupe] who sees magnified what is under the pointer; always
+ */
+
+/** How near to a point a press means it, CSS pixels, unless the point says; a finger is less exact. */
 const REACH = 12;
 const REACH_FINGER = 24;
 const KEY_ZOOM = 1.25;
@@ -45,9 +56,13 @@ const KEY_ZOOM = 1.25;
 /** @type {Readonly<Record<string, readonly [number, number]>>} */
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
+/** @typedef {{brightness: number, contrast: number}} Light */
+const PLAIN = { brightness: 1, contrast: 1 };
+
 export class ImagePane {
   #element;
   #events;
+  #loupe;
   #picture = document.createElement("canvas");
   #drawing = document.createElement("canvas");
   /** @type {HTMLImageElement | null} only once it is loaded */
@@ -60,6 +75,10 @@ export class ImagePane {
   /** Whether the whole image is to be shown, whatever becomes of the pane's size. */
   #fits = true;
   #pane = { width: 0, height: 0 };
+  /** A round brush that is seen at the aim; the diameter in image pixels. @type {{diameter: number, color: string} | null} */
+  #brush = null;
+  /** @type {Light} */
+  #light = PLAIN;
   /** Where the crosshair is. @type {{at: Place, by: "pointer" | "finger" | "keys"} | null} */
   #aim = null;
   /** Where keys took the crosshair last. @type {Place | null} */
@@ -71,10 +90,12 @@ export class ImagePane {
   /**
    * @param {HTMLElement} element that the pane fills; it must be positioned, take the focus and have a name
    * @param {PaneEvents} events
+   * @param {PaneOptions} [options]
    */
-  constructor(element, events) {
+  constructor(element, events, { loupe = "always" } = {}) {
     this.#element = element;
     this.#events = events;
+    this.#loupe = loupe;
     element.classList.add("image-pane");
     for (const canvas of [this.#picture, this.#drawing]) {
       canvas.setAttribute("aria-hidden", "true");
@@ -82,7 +103,7 @@ export class ImagePane {
     }
     const unwatch = watchGestures(element, {
       press: (at, event) => this.#press(at, event),
-      click: (at) => this.#click(imageFromPane(this.#view, at)),
+      click: (at, event) => this.#click(imageFromPane(this.#view, at), event),
       pan: (dx, dy) => this.#turn(shifted(this.#view, dx, dy, this.#size, this.#pane)),
       magnify: (factor, about) => this.zoomTo(this.#view.zoom * factor, about),
       hover: (at, touch) => this.#hover(at, touch),
@@ -92,6 +113,7 @@ export class ImagePane {
     const { signal } = this.#stopped;
     element.addEventListener("keydown", (event) => this.#key(event), { signal });
     element.addEventListener("blur", () => this.#leave(), { signal });
+    element.addEventListener("dblclick", (event) => this.#doubleClick(event), { signal });
     signal.addEventListener("abort", () => {
       unwatch();
       sizes.disconnect();
@@ -140,6 +162,28 @@ export class ImagePane {
 
   set overlay(overlay) {
     this.#overlay = overlay;
+    this.#redraw("drawing");
+  }
+
+  /** How bright the image is shown, and how contrasted: 1, 1 as it is. */
+  get light() {
+    return this.#light;
+  }
+
+  set light(light) {
+    this.#light = light;
+    this.#picture.style.filter = filterOf(light);
+    this.#redraw("drawing");
+  }
+
+  /** A round brush to be seen instead of the pointer; the diameter in image pixels. */
+  get brush() {
+    return this.#brush;
+  }
+
+  set brush(brush) {
+    this.#brush = brush;
+    this.#element.classList.toggle("brushing", brush !== null);
     this.#redraw("drawing");
   }
 
@@ -214,36 +258,46 @@ export class ImagePane {
     }
     const context = cleared(this.#drawing, this.#pane);
     if (this.#image !== null) {
-      paintOverlay(context, this.#overlay, this.#view, paint);
-      if (this.#aim !== null) {
+      paintOverlay(context, this.#overlay, this.#view, this.#size, paint);
+      if (this.#aim !== null && this.#brush !== null) paintBrush(context, this.#aim.at, this.#brush, this.#view, paint);
+      const seen = this.#aim?.by === "pointer" && this.#loupe === "fingers";
+      if (this.#aim !== null && !seen) {
         const loupe = { at: this.#aim.at, cross: this.#aim.by !== "pointer", above: this.#aim.by === "finger" };
-        paintLoupe(context, loupe, this.#image, this.#overlay, this.#view, this.#pane, paint);
+        const magnified = this.#loupe === "always" || loupe.above;
+        paintLoupe(context, loupe, this.#image, this.#overlay, this.#view, this.#pane, paint, magnified ? filterOf(this.#light) : null);
       }
     }
     this.#stale = { picture: false, drawing: false };
   }
 
-  /** @param {Place} at in the image */
-  #click(at) {
+  /** @param {Place} at in the image @param {Modifiers} event */
+  #click(at, event) {
     if (this.#image === null || !within(at, this.#size)) return;
     this.#cursor = at;
-    this.#events.onClick?.(at);
+    this.#events.onClick?.(at, event);
+  }
+
+  /** @param {MouseEvent} event */
+  #doubleClick(event) {
+    if (this.#image === null) return;
+    const { left, top } = this.#element.getBoundingClientRect();
+    this.#events.onDoubleClick?.(imageFromPane(this.#view, { x: event.clientX - left, y: event.clientY - top }));
   }
 
   /** @param {Place} at in the pane @param {PointerEvent} event @returns {import("./pane_gestures.js").Drag | null} */
   #press(at, event) {
     if (this.#image === null) return null;
     const inImage = imageFromPane(this.#view, at);
-    const point = this.#pointNear(at, event.pointerType === "touch" ? REACH_FINGER : REACH);
-    if (point !== null) return this.#dragOf(point, at);
+    const point = this.#pointNear(at, event.pointerType === "touch");
+    if (point !== null) return this.#dragOf(point, at, event);
     const taken = within(inImage, this.#size) ? this.#events.onPress?.(inImage, event) : null;
     if (taken === null || taken === undefined) return null;
     const held = (/** @type {Place} */ place) => this.#held(imageFromPane(this.#view, place));
     return { move: (to) => taken.move(held(to)), end: (to) => taken.end(held(to)), cancel: () => taken.cancel() };
   }
 
-  /** @param {Point} point @param {Place} from in the pane @returns {import("./pane_gestures.js").Drag} */
-  #dragOf(point, from) {
+  /** @param {Point} point @param {Place} from in the pane @param {Modifiers} event @returns {import("./pane_gestures.js").Drag} */
+  #dragOf(point, from, event) {
     const start = { x: point.x, y: point.y };
     const grip = paneFromImage(this.#view, start);
     // It is held where it was taken, and does not jump under the pointer.
@@ -257,6 +311,7 @@ export class ImagePane {
       },
       end: (to) => {
         if (movedBy) this.#events.onMovePoint?.(point.id, place(to), "end");
+        else this.#events.onClickPoint?.(point.id, event);
       },
       cancel: () => {
         if (movedBy) this.#events.onMovePoint?.(point.id, start, "cancel");
@@ -270,13 +325,14 @@ export class ImagePane {
     return { x: Math.max(0, Math.min(width, at.x)), y: Math.max(0, Math.min(height, at.y)) };
   }
 
-  /** @param {Place} at in the pane @param {number} reach */
-  #pointNear(at, reach) {
+  /** @param {Place} at in the pane @param {boolean} finger */
+  #pointNear(at, finger) {
     let nearest = null;
+    let least = Infinity;
     for (const point of this.#overlay.points) {
       const { x, y } = paneFromImage(this.#view, point);
       const away = Math.hypot(x - at.x, y - at.y);
-      if (away <= reach) [nearest, reach] = [point, away];
+      if (away <= (finger ? REACH_FINGER : (point.reach ?? REACH)) && away < least) [nearest, least] = [point, away];
     }
     return nearest;
   }
@@ -285,12 +341,14 @@ export class ImagePane {
   #hover(at, touch) {
     const place = at === null ? null : imageFromPane(this.#view, at);
     this.#aim = place !== null && within(place, this.#size) ? { at: place, by: touch ? "finger" : "pointer" } : null;
+    this.#events.onHover?.(this.#aim?.at ?? null, touch ? "finger" : "pointer");
     this.#redraw("drawing");
   }
 
   #leave() {
     if (this.#aim?.by !== "keys") return;
     this.#aim = null;
+    this.#events.onHover?.(null, "keys");
     this.#redraw("drawing");
   }
 
@@ -300,7 +358,7 @@ export class ImagePane {
     const arrow = ARROWS[event.key];
     if (arrow !== undefined) this.#step(arrow, event.altKey ? 0.1 : event.shiftKey ? 10 : 1);
     else if (event.altKey) return;
-    else if (event.key === "Enter") this.#click(this.#cursor ?? this.#middle());
+    else if (event.key === "Enter") this.#click(this.#cursor ?? this.#middle(), event);
     else if (event.key === "+" || event.key === "=") this.#keyZoom(KEY_ZOOM);
     else if (event.key === "-") this.#keyZoom(1 / KEY_ZOOM);
     else if (event.key === "0") this.fit();
@@ -330,8 +388,15 @@ export class ImagePane {
     this.#cursor = to;
     this.#aim = { at: to, by: "keys" };
     this.#turn(revealed(this.#view, to, this.#size, this.#pane));
-    if (active !== undefined) this.#events.onMovePoint?.(active.id, to, "end");
+    if (active === undefined) this.#events.onHover?.(to, "keys");
+    else if (this.#events.onStepPoint !== undefined) this.#events.onStepPoint(active.id, to);
+    else this.#events.onMovePoint?.(active.id, to, "end");
   }
+}
+
+/** As CSS and canvases take it. @param {Light} light */
+function filterOf({ brightness, contrast }) {
+  return brightness === 1 && contrast === 1 ? "none" : `brightness(${brightness}) contrast(${contrast})`;
 }
 
 /** @param {HTMLCanvasElement} canvas @param {import("./image_view.js").Size} pane */

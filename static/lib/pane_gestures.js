@@ -13,7 +13,7 @@
 /**
  * @typedef {object} Gestures
  * @property {(at: Place, event: PointerEvent) => Drag | null} press the main button or a finger went down; null: a click or a pan
- * @property {(at: Place) => void} click it came up again at the same place
+ * @property {(at: Place, event: PointerEvent) => void} click it came up again at the same place
  * @property {(dx: number, dy: number) => void} pan
  * @property {(factor: number, about: Place) => void} magnify
  * @property {(at: Place | null, touch: boolean) => void} hover null: the pointer has left
@@ -91,7 +91,7 @@ export function watchGestures(element, gestures) {
     const at = placeOf(event);
     if (down.size === 0) {
       if (press.drag !== null) press.drag.end(at);
-      else if (!press.panning) gestures.click(at);
+      else if (!press.panning) gestures.click(at, event);
       press = null;
     }
     if (event.pointerType === "touch") gestures.hover(null, true);
