@@ -38,7 +38,7 @@ def test_a_hull_moves_turns_and_scales_with_its_box():
 
 @given(st.lists(st.tuples(*[st.floats(-2, 2, width=32)] * 3), min_size=4, max_size=9), st.integers(0, 2**16))
 def test_a_hull_comes_back_from_its_bytes_bit_by_bit(corners: list[tuple[float, ...]], seed: int):
-    faces = np.random.default_rng(seed).integers(0, len(corners), (5, 3))
+    faces = np.random.default_rng(seed).permutation(len(corners))[FACES]
     hull = HullMesh(np.array(corners), faces)
     back = HullMesh.from_bytes(hull.vertex_bytes, hull.face_bytes)
     assert np.array_equal(back.vertices, hull.vertices)
@@ -74,6 +74,7 @@ def test_nobody_can_change_it():
         (CORNERS[:3], FACES, r"4 to 1000000 vertices of three numbers, not shape \[3, 3\]"),
         (CORNERS[:, :2], FACES, r"vertices of three numbers, not shape \[4, 2\]"),
         (CORNERS, FACES[:3], r"faces of three numbers, not shape \[3, 3\]"),
+        (CORNERS, FACES[[0, 1, 2, 2]], "must be closed.* between vertices 0 and 2"),
         (CORNERS, FACES + 1, "whole numbers from 0 to 3"),
         (CORNERS, FACES - 1, "whole numbers from 0 to 3"),
         (CORNERS, FACES * 1.0, "whole numbers from 0 to 3"),
