@@ -2,13 +2,15 @@
 
 import { angleBetween, uprighted } from "../lib/rotation.js";
 import * as store from "../store.js";
+import { maskCommands, removeMask, stepDrawing } from "./masks/commands.js";
+import { begin } from "./masks/subject.js";
 import * as sight from "./photo_sight.js";
 
 /**
  * @typedef {object} Command
  * @property {string} id
  * @property {string} title
- * @property {"View" | "Frames" | "Tools" | "Box" | "Session"} group
+ * @property {"View" | "Frames" | "Tools" | "Masks" | "Box" | "Session"} group
  * @property {string[]} keys as `chord` writes them; the first is shown
  * @property {() => void} run
  * @property {() => boolean} [when] whether it can be done now
@@ -22,7 +24,9 @@ const TILT = 1e-6;
 
 const hasBox = () => store.selectedBox.value !== null;
 const canEdit = () => hasBox() && !store.selectedBox.value?.locked;
-const inPlace = () => store.mode.value !== "export";
+const inMasks = () => store.mode.value === "masks";
+/** Where boxes are seen in 3D, and not hidden behind panes or options. */
+const inPlace = () => store.mode.value !== "export" && !inMasks();
 const inFrame = () => store.mode.value === "frame";
 
 /** Run an action on the selected box; what goes wrong is shown at the box. @param {(id: number) => Promise<void>} action */
@@ -43,7 +47,7 @@ function goMode(mode) {
 /** @param {import("../store.js").Tool} tool */
 function take(tool) {
   store.tool.value = tool;
-  if (store.mode.value === "export") goMode("scene");
+  if (!inPlace()) goMode("scene");
 }
 
 /** In a frame, where the camera stays, the photo is zoomed to the box instead. */
@@ -114,9 +118,11 @@ function arrows() {
 
 /** @type {Command[]} */
 export const commands = [
+  ...maskCommands,
   { id: "mode-scene", title: "Scene", group: "View", keys: ["1"], run: () => goMode("scene") },
   { id: "mode-frame", title: "Frame", group: "View", keys: ["2"], run: () => actions.enterFrame() },
-  { id: "mode-export", title: "Export", group: "View", keys: ["3"], run: () => goMode("export") },
+  { id: "mode-masks", title: "Masks", group: "View", keys: ["3"], run: () => goMode("masks") },
+  { id: "mode-export", title: "Export", group: "View", keys: ["4"], run: () => goMode("export") },
   {
     id: "toggle-frame",
     title: "Enter or leave the current frame",
@@ -166,15 +172,16 @@ export const commands = [
   { id: "resize", title: "Resize by its faces", group: "Tools", keys: ["S"], run: () => take("resize") },
   {
     id: "new-box",
-    title: "New box where the view looks",
+    title: "New box where the view looks, or new object to outline",
     group: "Tools",
     keys: ["B"],
     run: () => {
       const known = store.classOfNew.value;
       if (known === null) store.setProblem("boxes", "A box needs a class: add one below first.");
+      else if (inMasks()) begin(known);
       else actions.newBox(known);
     },
-    when: inPlace,
+    when: () => store.mode.value !== "export",
   },
   { id: "points", title: "Box from four points", group: "Tools", keys: ["P"], run: () => take("points") },
   {
@@ -198,9 +205,9 @@ export const commands = [
   },
 
   ...arrows(),
-  { id: "ground", title: "Rest on the ground", group: "Box", keys: ["E"], run: () => onBox(actions.restOnGround), when: canEdit },
-  { id: "duplicate", title: "Duplicate", group: "Box", keys: ["Ctrl+D"], run: () => onBox(actions.duplicateBox), when: hasBox },
-  { id: "delete", title: "Delete", group: "Box", keys: ["Delete", "Backspace"], run: () => onBox(actions.deleteBox), when: canEdit },
+  { id: "ground", title: "Rest on the ground", group: "Box", keys: ["E"], run: () => onBox(actions.restOnGround), when: () => canEdit() && !inMasks() },
+  { id: "duplicate", title: "Duplicate", group: "Box", keys: ["Ctrl+D"], run: () => onBox(actions.duplicateBox), when: () => hasBox() && !inMasks() },
+  { id: "delete", title: "Delete", group: "Box", keys: ["Delete", "Backspace"], run: () => (inMasks() ? removeMask() : onBox(actions.deleteBox)), when: () => inMasks() || canEdit() },
   {
     id: "hide",
     title: "Hide or show",
@@ -233,8 +240,8 @@ export const commands = [
   { id: "next-box", title: "Next box", group: "Box", keys: ["]"], run: () => stepBox(1), when: () => store.boxes.value.size > 0, repeats: true },
   { id: "previous-box", title: "Previous box", group: "Box", keys: ["["], run: () => stepBox(-1), when: () => store.boxes.value.size > 0, repeats: true },
 
-  { id: "undo", title: "Undo", group: "Session", keys: ["Ctrl+Z"], run: () => void actions.undo(), repeats: true },
-  { id: "redo", title: "Redo", group: "Session", keys: ["Ctrl+Shift+Z", "Ctrl+Y"], run: () => void actions.redo(), repeats: true },
+  { id: "undo", title: "Undo", group: "Session", keys: ["Ctrl+Z"], run: () => stepDrawing("undo") || void actions.undo(), repeats: true },
+  { id: "redo", title: "Redo", group: "Session", keys: ["Ctrl+Shift+Z", "Ctrl+Y"], run: () => stepDrawing("redo") || void actions.redo(), repeats: true },
   {
     id: "history",
     title: "History",
@@ -267,6 +274,7 @@ function stepBox(step) {
 
 function backOut() {
   if (store.overlay.value !== null) store.overlay.value = null;
+  else if (inMasks()) goMode("scene");
   else if (store.tool.value !== "select") store.tool.value = "select";
   else if (store.selected.value !== null) store.selected.value = null;
   else if (store.mode.value === "frame") actions.leaveFrame();

@@ -5,9 +5,10 @@ import { html } from "../lib/view.js";
 import * as store from "../store.js";
 import { BoxNumbers } from "./box_numbers.js";
 import { BoxesList } from "./boxes_list.js";
-import { Classes } from "./classes.js";
+import { addingClass, Classes } from "./classes.js";
 import { ConflictCard } from "./conflict_card.js";
 import { HistoryPanel } from "./history_panel.js";
+import { MakeBox, MasksPanel } from "./masks/panel.js";
 import { NewBox } from "./new_box.js";
 import { TellingFrames } from "./telling_frames.js";
 
@@ -18,17 +19,19 @@ const TABS = /** @type {const} */ ([
 
 export function SidePanel() {
   const shown = store.sidePanel.value;
+  const inMasks = store.mode.value === "masks";
   return html`<div class="panel-top">
       <${Tabs} />
-      ${shown === "boxes" && store.boxes.value.size > 0 && html`<${NewBox} />`}
+      ${shown === "boxes" && (inMasks || store.boxes.value.size > 0) && html`<${NewBox} />`}
     </div>
     <${ConflictCard} />
     <div class="panel-body" role="tabpanel" id="panel-body" aria-labelledby=${`tab-${shown}`}>
       ${shown === "boxes"
-        ? html`<${BoxesList} /><${BoxNumbers} /><${TellingFrames} /><${Classes} /><${Facts} />`
+        ? html`<${BoxesList} />${inMasks ? html`<${MasksPanel} />` : html`<${BoxNumbers} /><${TellingFrames} />`}${(!inMasks || addingClass.value || store.classes.value.size === 0) && html`<${Classes} />`}${!inMasks && html`<${Facts} />`}`
         : html`<${HistoryPanel} />`}
     </div>
-    ${store.mode.value !== "export" &&
+    ${inMasks && html`<${MakeBox} />`}
+    ${!inMasks && store.mode.value !== "export" &&
     html`<div class="panel-foot">
       <button class="button main" onClick=${command("mode-export").run}>Export training set</button>
     </div>`}`;

@@ -8,6 +8,7 @@ import { Hints } from "./hints.js";
 import { asked } from "./photo_sight.js";
 import { MadeBox, PointsTool } from "./points_tool.js";
 import { ExportPanel } from "./export/panel.js";
+import { MasksMode } from "./masks/mode.js";
 
 /** @param {{view: string}} props `view`: the name by which the server knows the page's scene */
 export function Stage({ view }) {
@@ -53,7 +54,8 @@ export function Stage({ view }) {
     if (asked.value !== null) frame.current?.contentWindow?.postMessage(asked.value, location.origin);
   });
 
-  const filled = store.mode.value === "export" || store.tool.value === "points";
+  const mode = store.mode.value;
+  const filled = mode === "export" || mode === "masks" || store.tool.value === "points";
   return html`<main class="stage" aria-label="Scene">
     <iframe
       ref=${frame} title="3D scene: the tracked cameras and the virtual boxes" inert=${filled}
@@ -61,8 +63,9 @@ export function Stage({ view }) {
     ></iframe>
     ${!ready.value && !filled && html`<div class="cover" role="status">Opening the scene</div>`}
     ${!filled && html`<${Overlays} /><${Hints} />`}
-    ${store.mode.value === "export" && html`<div class="filled"><${ExportPanel} /></div>`}
-    ${store.mode.value !== "export" && store.tool.value === "points" && html`<div class="filled"><${PointsTool} /></div>`}
+    ${mode === "export" && html`<div class="filled"><${ExportPanel} /></div>`}
+    ${mode === "masks" && html`<div class="filled"><${MasksMode} /></div>`}
+    ${mode !== "export" && mode !== "masks" && store.tool.value === "points" && html`<div class="filled"><${PointsTool} /></div>`}
   </main>`;
 }
 

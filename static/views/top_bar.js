@@ -9,6 +9,7 @@ import * as store from "../store.js";
 const MODES = /** @type {const} */ ([
   ["scene", "Scene"],
   ["frame", "Frame"],
+  ["masks", "Masks"],
   ["export", "Export"],
 ]);
 
