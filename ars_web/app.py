@@ -37,10 +37,13 @@ from ars_web.api import (
     login,
     masks,
     openapi,
+    outline_jobs,
     points,
     polygons,
     problems,
+    refine,
     scene_door,
+    segment,
     sessions,
     telling_frames,
 )
@@ -58,6 +61,10 @@ from ars_web.api.websocket_wire import WebsocketWire
 from ars_web.datasets.exports import ExportJobs
 from ars_web.errors import BadInput, StoreError
 from ars_web.masks.boxing import ObjectBoxes
+from ars_web.masks.grab_cut import GrabCutSegmenter
+from ars_web.masks.onnx_segmenter import OnnxSegmenter
+from ars_web.masks.propagation_jobs import OutlineJobs
+from ars_web.masks.segmenter import Segmenter
 from ars_web.scene.server import SceneServers
 from ars_web.sessions.editing import SessionEditor
 from ars_web.sessions.import_jobs import ImportJobs
@@ -82,11 +89,16 @@ WEBSOCKETS: Mapping[str, Any] = {
 
 
 def create_app(settings: Settings) -> FastAPI:
-    """The application. Nothing is opened or written before its lifespan begins; all is closed when that ends."""
+    """The application. Nothing is written or kept open before its lifespan begins; all is closed when that ends.
+
+    Raises:
+        BadFile: the segmenter's file holds none.
+    """
+    segmenter = GrabCutSegmenter() if settings.segmenter is None else OnnxSegmenter(settings.segmenter)
     app = FastAPI(
         title="ARS Web",
         version=__version__,
-        lifespan=_lifespan(settings),
+        lifespan=_lifespan(settings, segmenter),
         openapi_url=None,
         docs_url=None,
         redoc_url=None,
@@ -106,7 +118,10 @@ def create_app(settings: Settings) -> FastAPI:
         boxes,
         hulls,
         masks,
+        segment,
+        outline_jobs,
         hull_preview,
+        refine,
         polygons,
         telling_frames,
         history,
@@ -127,7 +142,7 @@ def create_app(settings: Settings) -> FastAPI:
     return app
 
 
-def _lifespan(settings: Settings) -> Callable[[FastAPI], AbstractAsyncContextManager[None]]:
+def _lifespan(settings: Settings, segmenter: Segmenter) -> Callable[[FastAPI], AbstractAsyncContextManager[None]]:
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncGenerator[None]:
         make_executor = executor_factory(settings.executor)
@@ -138,16 +153,19 @@ def _lifespan(settings: Settings) -> Callable[[FastAPI], AbstractAsyncContextMan
             )
             uploads = Uploads(settings.sessions)
             import_jobs = ImportJobs(store, uploads)
+            editor = SessionEditor(store)
+            outlines = OutlineJobs(store, editor)
             try:
                 uploads.sweep()
                 jobs.resume_unfinished()
-                editor = SessionEditor(store)
                 async with EventHub(store).running() as hub, _closing(SceneServers(store, editor)) as scenes:
                     unlisten = editor.listen(hub.wake)
                     app.state.services = Services(
                         store=store,
                         editor=editor,
                         objects=ObjectBoxes(store, editor),
+                        outlines=outlines,
+                        segmenter=segmenter,
                         exports=jobs,
                         uploads=uploads,
                         looks=ImportLooks(),
@@ -175,6 +193,7 @@ def _lifespan(settings: Settings) -> Callable[[FastAPI], AbstractAsyncContextMan
                     finally:
                         unlisten()
             finally:
+                await run_in_threadpool(outlines.close)
                 await run_in_threadpool(import_jobs.close)
                 await run_in_threadpool(jobs.close)
 
@@ -285,6 +304,7 @@ def serve(
             # Whoever interrupts a second time does not wait for the lifespan's end; an export must not keep it up.
             if hasattr(app.state, "services"):
                 app.state.services.scene_pages.close()
+                app.state.services.outlines.close()
                 app.state.services.imports.close()
                 app.state.services.exports.close()
 

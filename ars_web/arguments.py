@@ -49,7 +49,12 @@ Token = Annotated[
 Executor = Annotated[
     str, typer.Option("--executor", metavar="local|tls://HOST:PORT", help="Where exports run: here, or on Dask.")
 ]
-
+Segmenter = Annotated[
+    Path | None,
+    typer.Option(
+        "--segmenter", metavar="FILE.onnx", help="A network of your own for the smart tool; default: GrabCut."
+    ),
+]
 AllowedHosts = Annotated[
     list[str] | None,
     typer.Option("--allow-host", metavar="NAME", help="A further name the server is reached by; repeatable."),

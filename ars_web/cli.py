@@ -110,6 +110,7 @@ def serve(
     token: take.Token = None,
     executor: take.Executor = "local",
     workers: take.Workers = None,
+    segmenter: take.Segmenter = None,
     allow_host: take.AllowedHosts = None,
     sessions: take.Sessions = take.SESSIONS,
 ) -> None:
@@ -124,6 +125,7 @@ def serve(
         "token": token,
         "executor": executor,
         "workers": workers,
+        "segmenter": segmenter,
         "hosts": allow_host or [],
     }
     run_server(take.server_settings(given))

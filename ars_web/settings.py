@@ -26,6 +26,7 @@ class Settings(BaseModel):
         token: the bearer token; None: the one kept in `<sessions>/.token`.
         executor: where exports run.
         workers: processes of a local export; None: one a core.
+        segmenter: an ONNX file for the smart tool (`masks/onnx_segmenter.py` says what it must hold); None: GrabCut.
         largest_upload: bytes of an uploaded archive.
         largest_body: bytes of any other request's body.
     """
@@ -40,6 +41,7 @@ class Settings(BaseModel):
     token: Annotated[str, StringConstraints(pattern=r"^[\x21-\x7e]+$")] | None = None
     executor: Executor | Literal["local"] = "local"
     workers: int | None = Field(None, ge=1)
+    segmenter: Path | None = None
     largest_upload: int = Field(16 * GIB, ge=1)
     largest_body: int = Field(8 * MIB, ge=1)
 

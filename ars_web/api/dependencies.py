@@ -21,6 +21,8 @@ from ars_web.api.telling import TellingViews
 from ars_web.datasets.exports import ExportJobs
 from ars_web.errors import BadInput
 from ars_web.masks.boxing import ObjectBoxes
+from ars_web.masks.propagation_jobs import OutlineJobs
+from ars_web.masks.segmenter import Segmenter
 from ars_web.sessions.editing import SessionEditor
 from ars_web.sessions.import_jobs import ImportJobs
 from ars_web.sessions.import_looks import ImportLooks
@@ -36,6 +38,8 @@ class Services:
     Attributes:
         looks: recordings that were looked at before their import.
         objects: makes boxes of masks.
+        outlines: outlining of objects in further frames.
+        segmenter: what the smart tool finds objects with.
         lines: the live lines that are open.
         presence: who is at which session.
         scene: what the live lines show their pages.
@@ -49,6 +53,8 @@ class Services:
     store: SessionStore
     editor: SessionEditor
     objects: ObjectBoxes
+    outlines: OutlineJobs
+    segmenter: Segmenter
     exports: ExportJobs
     uploads: Uploads
     looks: ImportLooks

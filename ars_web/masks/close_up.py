@@ -81,7 +81,7 @@ class CloseUp:
         seen = rigid_transform.transform_points(rigid_transform.invert(self.T_world_camera), self.points)
         image = image_from_pixels(pixels_from_camera_points(self.camera, seen))
         # NaN is within nothing.
-        shown = ((image >= 0) & (image < (self.camera.width, self.camera.height))).all(axis=1)
+        shown = np.all((image >= 0) & (image < (self.camera.width, self.camera.height)), axis=1)
         return (image - (self.x0, self.y0)) * self.scale, shown, seen[:, 2]
 
     @cached_property

@@ -14,7 +14,7 @@ import numpy as np
 import shapely
 from jaxtyping import Bool, Float, UInt8
 
-from ars_web.errors import BadInput
+from ars_web.errors import BadFile, BadInput, TooLarge
 from ars_web.geometry.camera import image_from_pixels, pixels_from_camera_points
 from ars_web.geometry.mask_regions import polygons_of, region
 from ars_web.geometry.mesh_silhouette import silhouette
@@ -122,18 +122,37 @@ def propagate(
     points, spacing = _points_within(hull, drawn, widen, ground)
     sources = [_shot(view.frame, taken, read, region(view.polygons), points, steps) for view in drawn]
     truths = [shot.raster(view.polygons) for shot, view in zip(sources, drawn, strict=True)]
+    dropped: dict[int, str] = {}
     shots: dict[int, CloseUp] = {}
     possible: dict[int, Bool[np.ndarray, "h w"]] = {}
     for frame in frames:
         camera, T = camera_of(taken, frame), taken.frames.Ts_world_camera[frame]
         outline = silhouette(camera, T, hull.vertices, hull.faces)
-        shots[frame] = _shot(frame, taken, read, outline, points, steps)
+        try:
+            shots[frame] = _shot(frame, taken, read, outline, points, steps)
+        except (BadFile, TooLarge) as error:
+            dropped[frame] = f"its photograph cannot be read: {error}"
+            continue
         possible[frame] = shots[frame].raster(polygons_of(outline.buffer(1.0 / shots[frame].scale)))
     bench = Bench(
         shots, points, spacing, {shot.frame: (shot, mask) for shot, mask in zip(sources, truths, strict=True)}
     )
     found, agreement = _rounds(bench, Palette(list(zip(sources, truths, strict=True))), possible, steps)
-    return _sorted_out(bench, found, agreement, drawn, frames_most=frames_most, widen=widen, ground=ground)
+    chosen, doubts, unused = _sorted_out(bench, found, agreement, frames_most=frames_most)
+    dropped |= unused
+
+    def view(frame: int) -> View:
+        shot = shots[frame]
+        return View(frame, shot.camera, shot.T_world_camera, shot.polygons(found[frame], grow=GROW / shot.scale))
+
+    accepted = [view(frame) for frame in chosen]
+    return Propagation(
+        accepted=tuple(accepted),
+        doubtful=tuple(view(frame) for frame in sorted(doubts)),
+        doubts=tuple(Dropped(frame, doubts[frame]) for frame in sorted(doubts)),
+        dropped=tuple(Dropped(frame, dropped[frame]) for frame in sorted(dropped)),
+        hull=visual_hull([*drawn, *accepted], widen=widen, ground=ground),
+    )
 
 
 class _Steps:
@@ -176,13 +195,11 @@ def _sorted_out(
     bench: Bench,
     found: Mapping[int, Bool[np.ndarray, "h w"]],
     agreement: Agreement,
-    drawn: Sequence[View],
     *,
     frames_most: int,
-    widen: float,
-    ground: float | None,
-) -> Propagation:
-    """Which proposals count, which a person is asked about, and why the others are dropped."""
+) -> tuple[list[int], dict[int, str], dict[int, str]]:
+    """Frames whose proposals count, the most telling first; those that a person is asked about, with why; and those
+    that are dropped, with why."""
     doubts: dict[int, str] = {}
     dropped = {
         frame: "nothing there looks like the outlines that were drawn" for frame in bench.shots if frame not in found
@@ -215,18 +232,7 @@ def _sorted_out(
     for frame in sound:
         dropped[frame] = "it agrees with the others, and would hardly change the hull"
 
-    def view(frame: int) -> View:
-        shot = bench.shots[frame]
-        return View(frame, shot.camera, shot.T_world_camera, shot.polygons(found[frame], grow=GROW / shot.scale))
-
-    accepted = [view(frame) for frame in chosen]
-    return Propagation(
-        accepted=tuple(accepted),
-        doubtful=tuple(view(frame) for frame in sorted(doubts)),
-        doubts=tuple(Dropped(frame, doubts[frame]) for frame in sorted(doubts)),
-        dropped=tuple(Dropped(frame, dropped[frame]) for frame in sorted(dropped)),
-        hull=visual_hull([*drawn, *accepted], widen=widen, ground=ground),
-    )
+    return chosen, doubts, dropped
 
 
 def _shot(
@@ -260,7 +266,7 @@ def _points_within(
     for view in drawn:
         seen = transform_points(invert(view.T_world_camera), points)
         image = image_from_pixels(pixels_from_camera_points(view.camera, seen))
-        known: Bool[np.ndarray, "n"] = np.isfinite(image).all(axis=1)
+        known = np.isfinite(image[:, 0])
         inside = ~known
         shown = image[known]
         area = region(view.polygons).buffer(widen)
