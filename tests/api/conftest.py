@@ -165,6 +165,17 @@ def sid(client: httpx.Client) -> str:
 
 
 @pytest.fixture
+def ring(client: httpx.Client, server: Server, ring_scene: ModuleType) -> str:
+    """Where a new session is of the recording round the ball; it has the class `ball` of id 0, and `cube` of id 1."""
+    if not (server.root / "ring").exists():
+        ring_scene.write(server.root / "ring")
+    body = {"name": "ring", "root": "data", "path": "ring", "classes": ["ball", "cube"]}
+    made = client.post("/api/sessions", json=body)
+    assert made.status_code == 201, made.text
+    return f"/api/sessions/{made.json()['id']}"
+
+
+@pytest.fixture
 def box_json() -> dict[str, Any]:
     """A box to add, in the middle of the images."""
     place = {"position": [0.0, 0.0, 0.0], "wxyz": [1.0, 0.0, 0.0, 0.0]}
