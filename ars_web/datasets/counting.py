@@ -43,6 +43,7 @@ def select_labels(plan: ExportPlan, start: int, stop: int, *, with_visible: bool
         frames.camera_id[start:stop],
         frames.Ts_world_camera[start:stop],
         session.boxes,
+        hulls=session.hulls,
         with_visible=with_visible or plan.options.min_visible > 0,
     )
     return Selection(cameras, table, *kept(table, plan.options))

@@ -34,9 +34,9 @@ class ExportOption:
         title: its name for people.
         meaning: one line for people.
         type: of its value; `integers` and `texts` are lists.
-        optional: whether it may be null, which then is its default.
+        optional: whether it may be null, which then is its default, and is none of the choices.
         choices: of a `choice`; empty for others.
-        default: its value where nobody says.
+        default: its value where nobody says, or the choice that means the same.
         minimum, maximum: of numbers; None: no bound.
     """
 
@@ -78,9 +78,9 @@ def _option(name: str, field: dict[str, Any], default: Any) -> ExportOption:
         title=field["title"],
         meaning=field["description"],
         type=_TYPES[kind["type"], kind.get("items", {}).get("type", "")],
-        optional="anyOf" in field,
+        optional="anyOf" in field and "x-null-means" not in field,
         choices=tuple(OptionChoice(value, meanings[value]) for value in possible),
-        default=default,
+        default=field.get("x-null-means") if default is None else default,
         minimum=kind.get("minimum"),
         maximum=kind.get("maximum"),
     )

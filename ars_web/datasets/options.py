@@ -98,9 +98,14 @@ class ExportOptions(_Strict):
         None,
         title="Label shape",
         description="what labels are drawn round; default: the hull where a box has one, else the box",
-        json_schema_extra=_meanings(
-            box="the virtual box", hull="the visual hull of the object's masks", mesh="the class's mesh"
-        ),
+        json_schema_extra={
+            **_meanings(
+                box="the virtual box, also of objects that have a hull",
+                hull="the visual hull of the object's masks, where there is one; else the box",
+                mesh="the class's mesh",
+            ),
+            "x-null-means": "hull",
+        },
     )
     min_visible: Share = Field(
         0.0,

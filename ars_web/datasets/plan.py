@@ -18,10 +18,11 @@ from ars_web.datasets.file_names import stems
 from ars_web.datasets.images import source_stamp
 from ars_web.datasets.options import ExportOptions, FrameChoice
 from ars_web.datasets.registry import writer_of
-from ars_web.datasets.samples import check_shape
+from ars_web.datasets.samples import check_shape, hulls_of
 from ars_web.errors import BadInput
 from ars_web.geometry.box import Box
 from ars_web.geometry.camera import Camera
+from ars_web.geometry.mesh import Mesh
 from ars_web.sessions.model import SessionSnapshot
 
 SECONDS_PER_FRAME = {"none": 0.0003, "link": 0.0005, "copy": 0.001, "rectify": 0.02}
@@ -40,6 +41,7 @@ class PlannedSession:
     """What the work needs of one session.
 
     Attributes:
+        hulls: in the world, what the labels of each box are drawn round; None: the box.
         class_of_box: places in the plan's class names.
     """
 
@@ -48,6 +50,7 @@ class PlannedSession:
     revision: int
     cameras: dict[int, Camera]
     boxes: tuple[Box, ...]
+    hulls: tuple[Mesh | None, ...]
     class_of_box: tuple[int, ...]
 
 
@@ -138,7 +141,7 @@ def plan_export(
             + " frames; widen the choice of frames"
         )
     class_names = tuple(dict.fromkeys(c.name for s in snapshots for _, c in sorted(s.state.classes.items())))
-    sessions = tuple(_planned_session(snapshot, class_names) for snapshot in snapshots)
+    sessions = tuple(_planned_session(snapshot, class_names, options.shape) for snapshot in snapshots)
     # All frames are named, not only the chosen ones, so that a frame is called the same in every export.
     prefixes = [f"{s.id}_" if len(snapshots) > 1 else "" for s in snapshots]
     all_stems = iter(stems(p + name for p, s in zip(prefixes, snapshots, strict=True) for name in s.frames.names))
@@ -205,7 +208,7 @@ def _chosen(choice: FrameChoice, snapshot: SessionSnapshot) -> Int[np.ndarray, "
     return np.array(sorted(set(choice.list)), dtype=np.int64)
 
 
-def _planned_session(snapshot: SessionSnapshot, class_names: tuple[str, ...]) -> PlannedSession:
+def _planned_session(snapshot: SessionSnapshot, class_names: tuple[str, ...], shape: str | None) -> PlannedSession:
     state = snapshot.state
     place = {class_id: class_names.index(c.name) for class_id, c in state.classes.items()}
     boxes = [state.boxes[i] for i in sorted(state.boxes)]
@@ -215,6 +218,7 @@ def _planned_session(snapshot: SessionSnapshot, class_names: tuple[str, ...]) ->
         revision=state.revision,
         cameras=dict(sorted(snapshot.cameras.items())),
         boxes=tuple(b.box for b in boxes),
+        hulls=tuple(hulls_of(snapshot, shape=shape)),
         class_of_box=tuple(place[b.class_id] for b in boxes),
     )
 

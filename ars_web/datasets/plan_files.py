@@ -7,6 +7,7 @@ last: a folder without it holds no whole plan.
 import hashlib
 import json
 import os
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from ars_web.datasets.options import ExportOptions
 from ars_web.datasets.plan import ExportPlan, PlannedFrames, PlannedSession
 from ars_web.geometry.box import Box, stack
 from ars_web.geometry.camera import Camera
+from ars_web.geometry.mesh import Mesh
 
 _VERSION = 1
 """Of these files and of what a shard's folder holds; another version's partial folder is not resumed."""
@@ -58,6 +60,7 @@ def read_plan(folder: Path, *, out: Path) -> ExportPlan:
             tuple(Box(T, size) for T, size in zip(arrays[f"Ts_world_box_{i}"], arrays[f"sizes_{i}"], strict=True))
             for i in range(len(document["sessions"]))
         ]
+        hulls = [_hulls(arrays, i, len(boxes[i])) for i in range(len(boxes))]
     sessions = tuple(
         PlannedSession(
             id=session["id"],
@@ -65,6 +68,7 @@ def read_plan(folder: Path, *, out: Path) -> ExportPlan:
             revision=session["revision"],
             cameras={int(i): _camera(values) for i, values in session["cameras"].items()},
             boxes=boxes[number],
+            hulls=hulls[number],
             class_of_box=tuple(session["class_of_box"]),
         )
         for number, session in enumerate(document["sessions"])
@@ -115,7 +119,27 @@ def _arrays(plan: ExportPlan) -> dict[str, np.ndarray]:
     for number, session in enumerate(plan.sessions):
         Ts, sizes = stack(list(session.boxes))
         arrays |= {f"Ts_world_box_{number}": Ts, f"sizes_{number}": sizes}
+        hulls = [hull for hull in session.hulls if hull is not None]
+        if hulls:
+            # A session without hulls has none of these, so that its plan is what it was before there were any.
+            counts = [(0, 0) if hull is None else (len(hull.vertices_world), len(hull.faces)) for hull in session.hulls]
+            arrays |= {
+                f"hull_counts_{number}": np.array(counts, dtype=np.int64),
+                f"hull_vertices_{number}": np.concatenate([hull.vertices_world for hull in hulls]),
+                f"hull_faces_{number}": np.concatenate([hull.faces for hull in hulls]),
+            }
     return arrays
+
+
+def _hulls(arrays: Mapping[str, np.ndarray], number: int, boxes: int) -> tuple[Mesh | None, ...]:
+    """The hulls of a session's boxes, None for those without one."""
+    if f"hull_counts_{number}" not in arrays:
+        return (None,) * boxes
+    counts = arrays[f"hull_counts_{number}"]
+    ends = np.cumsum(counts, axis=0)[:-1]
+    vertices = np.split(arrays[f"hull_vertices_{number}"], ends[:, 0])
+    faces = np.split(arrays[f"hull_faces_{number}"], ends[:, 1])
+    return tuple(Mesh(v, f) if len(f) else None for v, f in zip(vertices, faces, strict=True))
 
 
 def _camera(values: dict[str, Any]) -> Camera:

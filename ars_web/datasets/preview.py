@@ -9,7 +9,7 @@ from jaxtyping import UInt8
 
 from ars_web.datasets.drawing import Canvas, Color, color_of
 from ars_web.datasets.file_names import stems
-from ars_web.datasets.samples import FrameLabel, frame_labels, labels_in_frames
+from ars_web.datasets.samples import FrameLabel, frame_labels, hulls_of, labels_in_frames
 from ars_web.errors import BadInput, NotFound, StoreError
 from ars_web.recordings.images import read_image
 from ars_web.sessions.model import SessionSnapshot
@@ -52,9 +52,16 @@ def preview(snapshot: SessionSnapshot, out: Path, *, count: int = 6) -> list[Pat
 
 
 def labelled_frames(snapshot: SessionSnapshot) -> list[int]:
-    """Indices of the frames in which some part of a box is in the image."""
-    frames, boxes = snapshot.frames, [b.box for b in snapshot.state.boxes.values()]
-    table = labels_in_frames(snapshot.cameras, frames.camera_ids, frames.Ts_world_camera, boxes, with_visible=False)
+    """Indices of the frames in which some part of a box, or of its hull where it has one, is in the image."""
+    frames, boxes = snapshot.frames, [box.box for _, box in sorted(snapshot.state.boxes.items())]
+    table = labels_in_frames(
+        snapshot.cameras,
+        frames.camera_ids,
+        frames.Ts_world_camera,
+        boxes,
+        hulls=hulls_of(snapshot, shape=None),
+        with_visible=False,
+    )
     return np.flatnonzero(~np.isnan(table.bbox[..., 0]).all(axis=1)).tolist() if boxes else []
 
 

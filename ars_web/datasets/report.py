@@ -71,7 +71,9 @@ class ExportReport(_Record):
     program: str = "ars-web"
     version: str = __version__
     options: ExportOptions
-    shape: str = Field(description="what the labels are outlines of: box")
+    shape: str = Field(
+        description="what the labels are drawn round: box, hull, or `hull or box` where some have no hull"
+    )
     sessions: list[SessionUsed]
     classes: list[ClassUsed]
     splits: dict[str, SplitCounts]
@@ -98,7 +100,7 @@ def report_of(plan: ExportPlan, shards: Iterable[ShardReport], joined: Mapping[s
     return ExportReport(
         format=plan.format,
         options=plan.options,
-        shape="box",
+        shape=_shape(plan),
         sessions=[
             SessionUsed(id=s.id, name=s.name, revision=s.revision, frames=int((plan.frames.session == number).sum()))
             for number, s in enumerate(plan.sessions)
@@ -110,6 +112,11 @@ def report_of(plan: ExportPlan, shards: Iterable[ShardReport], joined: Mapping[s
         label_files=len(digests),
         sha256=dataset_sha256(digests),
     )
+
+
+def _shape(plan: ExportPlan) -> str:
+    has_hull = {hull is not None for session in plan.sessions for hull in session.hulls}
+    return "hull or box" if len(has_hull) == 2 else "hull" if has_hull == {True} else "box"
 
 
 def used_splits(plan: ExportPlan) -> list[str]:

@@ -15,11 +15,18 @@ from ars_web.errors import BadInput, NotFound
 from ars_web.geometry import labels as geometry
 from ars_web.geometry.box import Box
 from ars_web.geometry.camera import Camera
+from ars_web.geometry.labels import BoxLabels
+from ars_web.geometry.mesh import Mesh
+from ars_web.geometry.mesh_labels import labels_of_meshes
+from ars_web.geometry.mesh_outlines import mesh_outlines
 from ars_web.geometry.occlusion import visible_fractions
 from ars_web.sessions.model import FrameTable, SessionSnapshot
 
-SHAPES: tuple[str, ...] = ("box",)
-"""What labels are drawn round today. No box has a stored hull yet, so `hull` falls back to the box."""
+SHAPES: tuple[str, ...] = ("box", "hull")
+"""What labels are drawn round today. A box without a stored hull is itself its shape, whatever was asked for."""
+
+Hulls = Sequence[Mesh | None]
+"""In the world, of each box; None for those whose labels are drawn round the box."""
 
 DROP_REASONS: tuple[str, ...] = ("not_in_image", "area", "truncation", "visibility")
 """Why a box of a frame has no label, in the order in which the rules are tried; the first that applies counts."""
@@ -34,7 +41,8 @@ class LabelTable:
         bbox_amodal: (n, b, 4) of the whole object, unclipped; NaN where nothing is in front of the camera.
         truncated: (n, b) share of the amodal outline outside the image; 1 where bbox is NaN.
         visible: (n, b) share of the in-image outline that no nearer box hides; NaN where bbox is NaN or where it
-            was not asked for.
+            was not asked for. Here hulls count as their boxes: of each box the part over `bbox`, hidden by the other
+            boxes as far as their own `bbox` reaches.
     """
 
     bbox: Float[np.ndarray, "n b 4"]
@@ -65,7 +73,7 @@ class FrameLabel:
         bbox: None where no part of the box is in the image.
         bbox_amodal: None where no part of the box is in front of the camera.
         outline: (k, 2) ring of the part in the image, not closed.
-        wireframe: polylines (k, 2) of the box's edges within the image.
+        wireframe: polylines (k, 2) of the box's edges within the image, whatever the label is drawn round.
         truncated: 1 where bbox is None.
         visible: 0 where bbox is None.
     """
@@ -90,31 +98,45 @@ class PreviewLabel:
     truncated: float
 
 
+def hulls_of(snapshot: SessionSnapshot, *, shape: str | None) -> list[Mesh | None]:
+    """The stored hulls of a session's boxes, by ascending box id; None where there is none, or for the shape `box`."""
+    state = snapshot.state
+    return [
+        Mesh(*snapshot.hulls[digest].in_world(box.box)) if shape != "box" and (digest := box.hull) is not None else None
+        for _, box in sorted(state.boxes.items())
+    ]
+
+
 def labels_in_frames(
     cameras: Mapping[int, Camera],
     camera_ids: Int[np.ndarray, "n"],
     Ts_world_camera: Float[np.ndarray, "n 4 4"],
     boxes: Sequence[Box],
     *,
+    hulls: Hulls | None = None,
     with_visible: bool = True,
     step: int = 8,
 ) -> LabelTable:
-    """Labels of every box in every frame; frames are taken together camera by camera.
+    """Labels of every box, or its hull, in every frame; frames are taken together camera by camera.
 
     `with_visible` False spares the search for nearer boxes; `step` is its grid in pixels.
     """
     n, b = len(camera_ids), len(boxes)
     table = LabelTable(np.full((n, b, 4), np.nan), np.full((n, b, 4), np.nan), np.ones((n, b)), np.full((n, b), np.nan))
-    if b == 0:
-        return table
+    meshes, plain = _columns(hulls, b)
     for camera, rows in _by_camera(cameras, camera_ids):
-        Ts, listed = Ts_world_camera[rows], list(boxes)
-        found = geometry.labels_of_boxes(camera, Ts, listed)
-        table.bbox[rows] = found.bbox
-        table.bbox_amodal[rows] = found.bbox_amodal
-        table.truncated[rows] = found.truncated
-        if with_visible:
-            table.visible[rows] = visible_fractions(camera, Ts, listed, found.bbox, step=step)
+        Ts = Ts_world_camera[rows]
+        found: list[tuple[list[int], BoxLabels]] = []
+        if plain:
+            found.append((plain, geometry.labels_of_boxes(camera, Ts, [boxes[i] for i in plain])))
+        if meshes:
+            found.append((list(meshes), labels_of_meshes(camera, Ts, list(meshes.values()))))
+        for columns, labels in found:
+            place = rows[:, None], np.array(columns)
+            table.bbox[place], table.bbox_amodal[place] = labels.bbox, labels.bbox_amodal
+            table.truncated[place] = labels.truncated
+        if with_visible and b:
+            table.visible[rows] = visible_fractions(camera, Ts, list(boxes), table.bbox[rows], step=step)
     return table
 
 
@@ -124,27 +146,39 @@ def outlines_in_frames(
     Ts_world_camera: Float[np.ndarray, "n 4 4"],
     boxes: Sequence[Box],
     wanted: Bool[np.ndarray, "n b"],
+    *,
+    hulls: Hulls | None = None,
 ) -> Outlines:
-    """Outlines of the boxes in the frames where they are wanted."""
+    """Outlines of the boxes, or their hulls, in the frames where they are wanted."""
     if not wanted.any():
         return Outlines(np.zeros((0, 2)), np.zeros(wanted.size + 1, dtype=np.int64))
     lengths = np.zeros(wanted.shape, dtype=np.int64)
-    found = [
-        (rows, *geometry.outlines(camera, Ts_world_camera[rows], boxes, wanted[rows]))
-        for camera, rows in _by_camera(cameras, camera_ids)
-    ]
-    for rows, _, offsets in found:
-        lengths[rows] = np.diff(offsets).reshape(len(rows), len(boxes))
+    meshes, plain = _columns(hulls, len(boxes))
+    found: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = []
+    for camera, rows in _by_camera(cameras, camera_ids):
+        Ts = Ts_world_camera[rows]
+        if plain:
+            of_boxes = [boxes[i] for i in plain]
+            columns = np.array(plain)
+            found.append((rows, columns, *geometry.outlines(camera, Ts, of_boxes, wanted[np.ix_(rows, columns)])))
+        if meshes:
+            columns = np.array(list(meshes))
+            of_hulls = list(meshes.values())
+            found.append((rows, columns, *mesh_outlines(camera, Ts, of_hulls, wanted[np.ix_(rows, columns)])))
+    for rows, columns, _, offsets in found:
+        lengths[np.ix_(rows, columns)] = np.diff(offsets).reshape(len(rows), len(columns))
     starts = np.concatenate([[0], np.cumsum(lengths)])
     joined = np.empty((starts[-1], 2))
-    for rows, points, offsets in found:
-        for i, row in enumerate(rows.tolist()):
-            first, last = len(boxes) * row, len(boxes) * (row + 1)
-            joined[starts[first] : starts[last]] = points[offsets[len(boxes) * i] : offsets[len(boxes) * (i + 1)]]
+    for rows, columns, points, offsets in found:
+        # Where each ring's points go: as far from its start there as from its start here.
+        at = starts[:-1].reshape(wanted.shape)[np.ix_(rows, columns)].ravel()
+        joined[np.repeat(at - offsets[:-1], np.diff(offsets)) + np.arange(len(points))] = points
     return Outlines(joined, starts)
 
 
-def label_table(snapshot: SessionSnapshot, indices: Sequence[int], *, step: int = 8) -> LabelTable:
+def label_table(
+    snapshot: SessionSnapshot, indices: Sequence[int], *, shape: str | None = None, step: int = 8
+) -> LabelTable:
     """Labels of all boxes of a session, by ascending box id, in the frames at `indices`, in that order."""
     rows = np.asarray(indices, dtype=np.int64)
     frames = snapshot.frames
@@ -153,6 +187,7 @@ def label_table(snapshot: SessionSnapshot, indices: Sequence[int], *, step: int 
         frames.camera_ids[rows],
         frames.Ts_world_camera[rows],
         [snapshot.state.boxes[i].box for i in sorted(snapshot.state.boxes)],
+        hulls=hulls_of(snapshot, shape=shape),
         step=step,
     )
 
@@ -180,7 +215,7 @@ def kept(table: LabelTable, options: ExportOptions) -> tuple[Bool[np.ndarray, "n
 def frame_labels(snapshot: SessionSnapshot, index: int, *, shape: str | None = None) -> list[FrameLabel]:
     """Labels of all boxes of a session in frame `index`, by ascending box id, those out of sight included.
 
-    `shape` is the export option of that name: boxes have no stored hull yet, so `hull` falls back to the box.
+    `shape` is the export option of that name: None and `hull` mean the hull where a box has one, else the box.
 
     Raises:
         NotFound: the session has no such frame.
@@ -190,21 +225,24 @@ def frame_labels(snapshot: SessionSnapshot, index: int, *, shape: str | None = N
     frames = snapshot.frames
     if not 0 <= index < len(frames):
         raise NotFound(f"session {snapshot.id} has no frame {index}; its frames are 0 to {len(frames) - 1}")
-    camera = snapshot.cameras[int(frames.camera_ids[index])]
-    T_world_camera = frames.Ts_world_camera[index]
-    table = label_table(snapshot, [index])
+    boxes = [virtual for _, virtual in sorted(snapshot.state.boxes.items())]
+    shapes, hulls = [virtual.box for virtual in boxes], hulls_of(snapshot, shape=shape)
+    camera_ids, Ts = frames.camera_ids[[index]], frames.Ts_world_camera[[index]]
+    table = labels_in_frames(snapshot.cameras, camera_ids, Ts, shapes, hulls=hulls)
+    seen = ~np.isnan(table.bbox[..., 0])
+    rings = outlines_in_frames(snapshot.cameras, camera_ids, Ts, shapes, seen, hulls=hulls)
+    camera = snapshot.cameras[int(camera_ids[0])]
     found: list[FrameLabel] = []
-    for column, box_id in enumerate(sorted(snapshot.state.boxes)):
-        virtual = snapshot.state.boxes[box_id]
+    for column, virtual in enumerate(boxes):
         bbox = _bbox_or_none(table.bbox[0, column])
         found.append(
             FrameLabel(
-                box_id=box_id,
+                box_id=virtual.id,
                 class_id=virtual.class_id,
                 bbox=bbox,
                 bbox_amodal=_bbox_or_none(table.bbox_amodal[0, column]),
-                outline=geometry.outline(camera, T_world_camera, virtual.box) if bbox else np.zeros((0, 2)),
-                wireframe=geometry.wireframe(camera, T_world_camera, virtual.box) if bbox else [],
+                outline=rings.points[rings.starts[column] : rings.starts[column + 1]],
+                wireframe=geometry.wireframe(camera, Ts[0], virtual.box) if bbox else [],
                 truncated=float(table.truncated[0, column]),
                 visible=float(table.visible[0, column]) if bbox else 0.0,
             )
@@ -251,6 +289,12 @@ def check_shape(shape: str | None) -> None:
         raise BadInput("shape 'mesh' needs a mesh for each class and this session has none; use 'box' or 'hull'")
     if shape not in (None, "box", "hull"):
         raise BadInput(f"shape {shape!r} is unknown; known are box, hull and mesh")
+
+
+def _columns(hulls: Hulls | None, b: int) -> tuple[dict[int, Mesh], list[int]]:
+    """The meshes by their column, and the columns without one."""
+    meshes = {i: hull for i, hull in enumerate(hulls or ()) if hull is not None}
+    return meshes, [i for i in range(b) if i not in meshes]
 
 
 def _by_camera(

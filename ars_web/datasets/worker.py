@@ -133,7 +133,7 @@ def _shard(plan: ExportPlan, number: int) -> tuple[Shard, dict[str, int]]:
     cameras, keep = selection.cameras, selection.keep
     camera_ids, Ts = frames.camera_id[start:stop], frames.Ts_world_camera[start:stop]
     wanted = keep if writer.with_outlines else np.zeros_like(keep)
-    outlines: Outlines = outlines_in_frames(cameras, camera_ids, Ts, session.boxes, wanted)
+    outlines: Outlines = outlines_in_frames(cameras, camera_ids, Ts, session.boxes, wanted, hulls=session.hulls)
     sizes: Int[np.ndarray, "n 2"] = np.array(
         [(cameras[i].width, cameras[i].height) for i in camera_ids.tolist()], dtype=np.int64
     )

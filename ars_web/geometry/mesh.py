@@ -45,23 +45,7 @@ class Mesh:
     def edges(self) -> Int[np.ndarray, "e 4"]:
         """Each edge with its two faces, the longest first: start, end, the face that runs along it from start to end,
         and the face that runs back."""
-        starts, ends = self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()
-        owners = np.repeat(np.arange(len(self.faces)), 3)
-        low, high, back = np.minimum(starts, ends), np.maximum(starts, ends), starts > ends
-        key = low * len(self.vertices_world) + high
-        forward, backward = np.flatnonzero(~back), np.flatnonzero(back)
-        forward = forward[np.argsort(key[forward], kind="stable")]
-        backward = backward[np.argsort(key[backward], kind="stable")]
-        if len(forward) != len(backward) or (key[forward] != key[backward]).any():
-            counts = {int(k): 0 for k in key}
-            for k, turned in zip(key.tolist(), back.tolist(), strict=True):
-                counts[k] += -1 if turned else 1
-            first = divmod(next(k for k, count in counts.items() if count), len(self.vertices_world))
-            raise BadInput(
-                f"a mesh must be closed, and all its faces turned the same way: the edge between vertices {first[0]}"
-                f" and {first[1]} is not run along as often in one direction as in the other"
-            )
-        found = np.column_stack([low[forward], high[forward], owners[forward], owners[backward]])
+        found = edges_of_faces(self.faces)
         return np.ascontiguousarray(found[np.argsort(-self._lengths(found), kind="stable")])
 
     @cached_property
@@ -89,3 +73,27 @@ class Mesh:
         """Centre and radius of a sphere round all vertices."""
         centre = (self.vertices_world.min(axis=0) + self.vertices_world.max(axis=0)) / 2
         return centre, float(np.linalg.norm(self.vertices_world - centre, axis=1).max())
+
+
+def edges_of_faces(faces: Int[np.ndarray, "f 3"]) -> Int[np.ndarray, "e 4"]:
+    """Each edge of a closed mesh with its two faces: the smaller of its vertices, the larger, the face that runs along
+    it in this order, and the face that runs back.
+
+    Raises:
+        BadInput: an edge belongs to more faces in one direction than in the other, so that the mesh has a border.
+    """
+    starts, ends = faces.ravel().astype(np.int64), np.roll(faces, -1, axis=1).ravel().astype(np.int64)
+    owners, back = np.repeat(np.arange(len(faces)), 3), starts > ends
+    low, high = np.minimum(starts, ends), np.maximum(starts, ends)
+    key = low * (int(high.max()) + 1) + high
+    forward, backward = np.flatnonzero(~back), np.flatnonzero(back)
+    forward = forward[np.argsort(key[forward], kind="stable")]
+    backward = backward[np.argsort(key[backward], kind="stable")]
+    if len(forward) != len(backward) or (key[forward] != key[backward]).any():
+        _, places, which = np.unique(key, return_index=True, return_inverse=True)
+        wrong = places[np.flatnonzero(np.bincount(which, np.where(back, -1, 1)))[0]]
+        raise BadInput(
+            "a mesh must be closed, and all its faces turned the same way: the edge between vertices"
+            f" {low[wrong]} and {high[wrong]} is not run along as often in one direction as in the other"
+        )
+    return np.column_stack([low[forward], high[forward], owners[forward], owners[backward]])

@@ -10,6 +10,7 @@ from jaxtyping import Float, Int
 
 from ars_web.errors import BadInput
 from ars_web.geometry.box import Box
+from ars_web.geometry.mesh import edges_of_faces
 from ars_web.geometry.rigid_transform import invert, transform_points
 
 MOST_CORNERS = 1_000_000
@@ -34,7 +35,7 @@ class HullMesh:
 
     def __post_init__(self) -> None:
         """Raises BadInput for what is no mesh: wrong shapes, corners that are not finite or too far, faces of corners
-        that are not there."""
+        that are not there or that leave the mesh open."""
         # What cannot be held is refused below.
         with np.errstate(over="ignore"):
             vertices = np.asarray(self.vertices, dtype=np.float64).astype(np.float32).astype(np.float64)
@@ -49,6 +50,7 @@ class HullMesh:
         if not np.issubdtype(faces.dtype, np.integer) or faces.min() < 0 or faces.max() >= len(vertices):
             raise BadInput(f"a hull's faces must be whole numbers from 0 to {len(vertices) - 1}, rows of its vertices")
         faces = faces.astype(np.int32)
+        edges_of_faces(faces)
         # Minus zero is zero: one shape has one name.
         vertices += 0.0
         vertices.flags.writeable = False

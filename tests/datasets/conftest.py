@@ -11,6 +11,7 @@ import pytest
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box
 from ars_web.geometry.camera import Camera
+from ars_web.sessions.hull_mesh import HullMesh
 from ars_web.sessions.model import FrameTable, ObjectClass, SessionSnapshot, SessionState, VirtualBox
 
 BENT = Camera(64, 48, 50.0, 51.0, 31.0, 24.5, "brown", (-0.2, 0.05, 0.001, -0.001, 0.0))
@@ -57,7 +58,7 @@ def write_images(folder: Path, names: list[str], sizes: list[tuple[int, int]]) -
 
 @pytest.fixture
 def make_snapshot(tmp_path: Path) -> Callable[..., SessionSnapshot]:
-    """Makes sessions of n frames with images on the disk, every fifth frame from a second camera."""
+    """Makes sessions of n frames with images on the disk, every fifth frame from a second camera; `hulls` by box."""
 
     def make(
         n: int = 12,
@@ -68,7 +69,9 @@ def make_snapshot(tmp_path: Path) -> Callable[..., SessionSnapshot]:
         suffix: str = ".jpg",
         one_camera: bool = False,
         revision: int = 3,
+        hulls: dict[int, HullMesh] | None = None,
     ) -> SessionSnapshot:
+        hulls = hulls or {}
         names = [f"{i:04d}{suffix}" for i in range(n)]
         camera_ids = np.zeros(n, dtype=np.int64) if one_camera else (np.arange(n) % 5 == 4).astype(np.int64)
         sizes = [(FLAT.width, FLAT.height) if i else (BENT.width, BENT.height) for i in camera_ids.tolist()]
@@ -78,16 +81,27 @@ def make_snapshot(tmp_path: Path) -> Callable[..., SessionSnapshot]:
             name=f"session {sid}",
             classes={i: ObjectClass(i, name, "#e6194b", 1) for i, name in enumerate(classes)},
             boxes={
-                i: VirtualBox(i, (i - 1) % len(classes), f"box {i}", box, 1) for i, box in enumerate(objects, 1)
+                i: VirtualBox(
+                    i, (i - 1) % len(classes), f"box {i}", box, 1, hull=hulls[i].digest if i in hulls else None
+                )
+                for i, box in enumerate(objects, 1)
             },
             next_class_id=len(classes),
             next_box_id=len(objects) + 1,
         )
         images = tuple(write_images(tmp_path / f"recording-{sid}" / "images", names, sizes))
         frames = FrameTable(tuple(names), images, camera_ids, circling(n))
-        return SessionSnapshot(sid, state, {0: BENT, 1: FLAT}, frames)
+        return SessionSnapshot(sid, state, {0: BENT, 1: FLAT}, frames, {hull.digest: hull for hull in hulls.values()})
 
     return make
+
+
+@pytest.fixture(scope="session")
+def octahedron() -> HullMesh:
+    """A hull that touches all six faces of its box, and is a sixth of it."""
+    tips = np.concatenate([np.eye(3), -np.eye(3)]) / 2
+    faces = [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]]
+    return HullMesh(tips, np.array(faces))
 
 
 @pytest.fixture

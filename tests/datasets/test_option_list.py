@@ -18,11 +18,11 @@ def given(name: str, value: object) -> dict[str, Any]:
 
 def test_every_option_is_there_but_those_that_leave_no_choice() -> None:
     assert list(OPTIONS) == [
-        "frames.step", "frames.start", "frames.stop", "frames.list", "images", "min_visible", "max_truncated",
-        "min_area_px", "split.train", "split.val", "split.test", "split.by", "split.seed", "sessions",
+        "frames.step", "frames.start", "frames.stop", "frames.list", "images", "shape", "min_visible",
+        "max_truncated", "min_area_px", "split.train", "split.val", "split.test", "split.by", "split.seed", "sessions",
     ]  # fmt: skip
     assert {name: option.type for name, option in OPTIONS.items() if option.type not in ("integer", "number")} == {
-        "frames.list": "integers", "images": "choice", "split.by": "choice", "sessions": "texts",
+        "frames.list": "integers", "images": "choice", "shape": "choice", "split.by": "choice", "sessions": "texts",
     }  # fmt: skip
 
 
@@ -32,7 +32,8 @@ def test_an_option_says_what_it_is_and_its_default_is_the_default(option: Export
     assert option.meaning
     assert option.title[0].isupper()
     assert option.meaning[0].islower()
-    if not option.name.startswith("split."):  # shares of one group depend on each other
+    # Shares of one group depend on each other, and a shape that nobody chose is kept as such.
+    if not option.name.startswith("split.") and option.name != "shape":
         assert ExportOptions.model_validate(given(option.name, option.default)) == ExportOptions.model_validate({})
     if option.optional:
         assert option.default is None
@@ -57,3 +58,10 @@ def test_every_choice_can_be_made_and_says_what_it_means(option: ExportOption) -
     for choice in option.choices:
         assert choice.meaning
         ExportOptions.model_validate(given(option.name, choice.value))
+
+
+def test_the_shape_that_nobody_chose_is_the_hull_and_meshes_are_not_offered() -> None:
+    shape = OPTIONS["shape"]
+    assert ExportOptions.model_validate({}).shape is None
+    assert (shape.default, shape.optional) == ("hull", False)
+    assert [choice.value for choice in shape.choices] == ["box", "hull"]
