@@ -719,6 +719,90 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/sessions/{sid}/frames/{index}/segment": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Segment
+         * @description Find an object's outline in a frame's photograph. Nothing is stored.
+         */
+        post: operations["frames-segment"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/boxes/{box_id}/outline-rest": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Outline Rest
+         * @description Outline an object in further frames, beginning from its masks that count, two at least; ask for the job again
+         *     to see how far it is.
+         *
+         *     All its outlines, the hull and the box are stored in one edit at the end, or nothing is. The box may be one that
+         *     is not made yet, of which there are masks only: it is made then. A box that was placed by hand stays where it is.
+         */
+        post: operations["boxes-outline-rest"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/outline-jobs/{job_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get
+         * @description How far an outlining is.
+         */
+        get: operations["outline-jobs-get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/outline-jobs/{job_id}/cancel": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Cancel
+         * @description Stop an outlining, which leaves nothing then. One that has ended stays as it is.
+         */
+        post: operations["outline-jobs-cancel"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/sessions/{sid}/hull-preview": {
         parameters: {
             query?: never;
@@ -734,6 +818,50 @@ export interface paths {
          *     stored or changed.
          */
         post: operations["hull-preview"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/boxes/{box_id}/refine": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Refine
+         * @description Move, turn and size a box that is at the revision in `If-Match` until its labels agree best with where its object
+         *     is seen: by least squares on what would be exported, from a place that may be some centimetres off.
+         *
+         *     A hull stays where it is in the world. With `dry_run` nothing is stored, and `If-Match` is not needed.
+         */
+        post: operations["boxes-refine"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/boxes/{box_id}/next-view": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Next View
+         * @description The frame in which to outline an object next, by its box or its accepted masks; null where no frame would add to
+         *     them. Frames in which other boxes hide it come last.
+         */
+        get: operations["boxes-next-view"];
+        put?: never;
+        post?: never;
         delete?: never;
         options?: never;
         head?: never;
@@ -1685,6 +1813,28 @@ export interface components {
             sha256: string;
         };
         /**
+         * FitJson
+         * @description What to fit a box to, and how.
+         */
+        FitJson: {
+            /**
+             * Views
+             * @description default: the object's accepted masks
+             */
+            views?: components["schemas"]["SeenJson"][] | null;
+            /**
+             * Orientation
+             * @description upright: position, turn about the world's z and size; free: turned anyhow; default: upright where the box stands upright
+             */
+            orientation?: ("upright" | "free") | null;
+            /**
+             * Dry Run
+             * @description whether to answer what the box would be, and leave it as it is
+             * @default false
+             */
+            dry_run: boolean;
+        };
+        /**
          * FoldersJson
          * @description A folder as one chooses from it. Hidden folders, and links that lead out of the root, are left out.
          */
@@ -1829,6 +1979,16 @@ export interface components {
             frame: number;
             /** Labels */
             labels: components["schemas"]["PreviewLabelJson"][];
+        };
+        /**
+         * FrameReasonAnswer
+         * @description A frame and what is to be said of its outline.
+         */
+        FrameReasonAnswer: {
+            /** Frame */
+            frame: number;
+            /** Reason */
+            reason: string;
         };
         /**
          * HealthJson
@@ -2544,9 +2704,9 @@ export interface components {
             frame: number;
             /**
              * Degrees
-             * @description to the nearest side from which it is drawn already
+             * @description to the nearest side from which it is drawn already; null: it is not
              */
-            degrees: number;
+            degrees: number | null;
             /** Reason */
             reason: string;
         };
@@ -2598,6 +2758,70 @@ export interface components {
             minimum: number | null;
             /** Maximum */
             maximum: number | null;
+        };
+        /**
+         * OutlineJobAnswer
+         * @description How far the outlining of an object is.
+         */
+        OutlineJobAnswer: {
+            /** Id */
+            id: string;
+            /** Box Id */
+            box_id: number;
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "queued" | "running" | "done" | "failed" | "cancelled";
+            /**
+             * Done
+             * @description steps of about the same length
+             */
+            done: number;
+            /**
+             * Total
+             * @description 0 until that is known
+             */
+            total: number;
+            /** Seconds Left */
+            seconds_left: number | null;
+            /**
+             * Accepted
+             * @description frames whose new outlines count, once done
+             */
+            accepted: number[];
+            /**
+             * Doubtful
+             * @description frames whose new outlines wait for a yes or a no
+             */
+            doubtful: number[];
+            /**
+             * Doubts
+             * @description why they do
+             */
+            doubts: components["schemas"]["FrameReasonAnswer"][];
+            /**
+             * Dropped
+             * @description frames that were looked at and got no outline
+             */
+            dropped: components["schemas"]["FrameReasonAnswer"][];
+            /**
+             * Error
+             * @description of a failed job; nothing was stored
+             */
+            error: string | null;
+        };
+        /**
+         * OutlineRestDraft
+         * @description How much further an object is to be outlined.
+         */
+        OutlineRestDraft: {
+            /**
+             * Frames Most
+             * @description outlines that are added at most; fewer, once more would hardly change the hull
+             * @default 10
+             */
+            frames_most: number;
         };
         /**
          * OverlayJson
@@ -2952,12 +3176,150 @@ export interface components {
             cy: number;
         };
         /**
+         * RefinedAnswer
+         * @description A box fitted to where its object is seen; its ETag is the box's.
+         */
+        RefinedAnswer: {
+            box: components["schemas"]["BoxAnswer"];
+            /** Residuals */
+            residuals: components["schemas"]["ResidualsJson"][];
+            /**
+             * Rms Px
+             * @description of all sides in all frames
+             */
+            rms_px: number;
+            /**
+             * Moved Mm
+             * @description the most that a corner moved
+             */
+            moved_mm: number;
+            /**
+             * Corner Error Mm
+             * @description one standard deviation of the worst corner, if every side was seen to a pixel
+             */
+            corner_error_mm: number;
+            /**
+             * Warnings
+             * @description what is doubtful, and what to do about it, for the user
+             */
+            warnings: string[];
+        };
+        /**
+         * ResidualsJson
+         * @description How far the box's label is off in one frame.
+         */
+        ResidualsJson: {
+            /** Frame */
+            frame: number;
+            /**
+             * Px
+             * @description how far its sides x0 y0 x1 y1 lie to the right of or below the seen ones; 0 for a side at the image's border that the label reaches
+             */
+            px: [
+                number,
+                number,
+                number,
+                number
+            ];
+            /** Rms Px */
+            rms_px: number;
+            /**
+             * Outlier
+             * @description whether it agrees much worse than the other frames do
+             */
+            outlier: boolean;
+        };
+        /**
          * RootJson
          * @description A folder that recordings may be imported from; where it lies is not told.
          */
         RootJson: {
             /** Name */
             name: string;
+        };
+        /**
+         * SeenJson
+         * @description Where the object is in one frame: the box round it, or its outline.
+         */
+        SeenJson: {
+            /**
+             * Polygons
+             * @description what an odd number of their rings enclose is inside; at most 20000 corners in all
+             */
+            polygons?: components["schemas"]["PolygonJson"][] | null;
+            /**
+             * Mask Png
+             * @description base64 of an 8-bit greyscale PNG of the image's size, non-zero inside
+             */
+            mask_png?: string | null;
+            /** Frame */
+            frame: number;
+            /**
+             * Bbox
+             * @description x0 y0 x1 y1, image coordinates: of the part in the image, whose sides at its border the object may go beyond; or, where it reaches out of the image, of the whole object
+             */
+            bbox?: [
+                number,
+                number,
+                number,
+                number
+            ] | null;
+        };
+        /**
+         * SegmentAnswer
+         * @description An outline that was found.
+         */
+        SegmentAnswer: {
+            /** Polygons */
+            polygons: components["schemas"]["PolygonAnswer"][];
+            /**
+             * Seconds
+             * @description that it took to find
+             */
+            seconds: number;
+        };
+        /**
+         * SegmentDraft
+         * @description Where an object is, roughly; image coordinates. At least one of `rectangle`, `inside` and `start`.
+         */
+        SegmentDraft: {
+            /**
+             * Rectangle
+             * @description x0, y0, x1, y1, all of the object within it
+             */
+            rectangle?: [
+                number,
+                number,
+                number,
+                number
+            ] | null;
+            /**
+             * Inside
+             * @description brush strokes on the object
+             */
+            inside?: [
+                number,
+                number
+            ][][];
+            /**
+             * Outside
+             * @description brush strokes beside it
+             */
+            outside?: [
+                number,
+                number
+            ][][];
+            /**
+             * Brush Width
+             * @description of the strokes, pixels
+             * @default 6
+             */
+            brush_width: number;
+            /**
+             * Start
+             * @description an outline to begin from, such as the last answer
+             */
+            start?: components["schemas"]["PolygonJson"][] | null;
         };
         /**
          * SessionChange
@@ -8185,6 +8547,388 @@ export interface operations {
             };
         };
     };
+    "frames-segment": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                sid: string;
+                index: number;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["SegmentDraft"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SegmentAnswer"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description beyond a limit, which the detail names */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "boxes-outline-rest": {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description a repeat with the same key answers what the first answered, and does nothing */
+                "idempotency-key"?: string | null;
+            };
+            path: {
+                sid: string;
+                box_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: {
+            content: {
+                "application/json": components["schemas"]["OutlineRestDraft"] | null;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["OutlineJobAnswer"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the thing is not in a state that allows this */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description beyond a limit, which the detail names */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "outline-jobs-get": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                sid: string;
+                job_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["OutlineJobAnswer"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "outline-jobs-cancel": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                sid: string;
+                job_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["OutlineJobAnswer"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     "hull-preview": {
         parameters: {
             query?: never;
@@ -8261,6 +9005,223 @@ export interface operations {
                 };
                 content: {
                     "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "boxes-refine": {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description the ETag of the thing as it was read */
+                "if-match"?: string | null;
+                /** @description a repeat with the same key answers what the first answered, and does nothing */
+                "idempotency-key"?: string | null;
+            };
+            path: {
+                sid: string;
+                box_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["FitJson"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RefinedAnswer"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the thing is not in a state that allows this */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description stale `If-Match`; `current` holds the thing as it is now */
+            412: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["StaleProblem"];
+                };
+            };
+            /** @description beyond a limit, which the detail names */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description `If-Match` is missing */
+            428: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "boxes-next-view": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                sid: string;
+                box_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["NextViewJson"] | null;
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ViewsProblem"];
                 };
             };
             /** @description a fault of the server, logged there under the number in the detail */
