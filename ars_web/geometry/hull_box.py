@@ -12,6 +12,9 @@ from ars_web.geometry.box import Box
 from ars_web.geometry.rigid_transform import rotation_about_z
 from ars_web.geometry.visual_hull import VisualHull
 
+LONGEST_EDGES = 24
+"""Of the convex hull, of which each pair is tried as two sides of the smallest box."""
+
 Orientation = Literal["world", "upright", "free"]
 Position = Literal["box", "mass"]
 
@@ -88,16 +91,16 @@ _AXES_FIRST = [np.eye(3)[:, order] for order in ((0, 1, 2), (1, 2, 0), (2, 0, 1)
 
 
 def _smallest_box_rotation(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "3 3"]:
-    """Each face of the convex hull as a side of the box, with the smallest rectangle round what is seen along its
-    normal; then turned about each axis in turn as long as the box gets smaller.
+    """The axes of the smallest box that is found with a side along a face of the convex hull, or along two of its
+    longest edges, and then by turning it about each axis in turn as long as it gets smaller.
 
-    The box on a face is no smaller than the height over the face times the area of what is seen along its normal, which
-    by Cauchy is half the sum of all faces' areas as seen along it: faces that cannot do better are not tried.
+    (Every smallest box has two sides that meet and hold an edge each: O'Rourke 1985, who tries all pairs of edges.)
+    A box with a side of a given normal is no smaller than the height along it times the area of what is seen along it,
+    which by Cauchy is half the sum of all faces' areas as seen along it: what cannot do better is not tried.
     """
-    corners, normals, areas = _convex_hull(points)
+    corners, normals, areas, edges = _convex_hull(points)
     best, smallest = np.eye(3), _volume(corners, np.eye(3))
-    along = np.round(normals, 9) + 0.0
-    along = np.unique(np.where(_points_down(along)[:, None], -along, along), axis=0)
+    along = _distinct(np.concatenate([normals, _normals_of_pairs(edges)]))
     heights = np.ptp(corners @ along.T, axis=0)
     bounds = heights * (np.abs(along @ normals.T) @ areas) / 2
     for i in np.argsort(bounds, kind="stable"):
@@ -108,7 +111,7 @@ def _smallest_box_rotation(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray
         before = smallest
         for turn in _AXES_FIRST:
             best, smallest = _smaller(corners, best @ turn, best, smallest)
-        if smallest > before * (1 - 1e-6):
+        if smallest >= before * (1 - 1e-6):
             return best
 
 
@@ -127,20 +130,38 @@ def _smaller(
 
 def _convex_hull(
     points: Float[np.ndarray, "n 3"],
-) -> tuple[Float[np.ndarray, "k 3"], Float[np.ndarray, "f 3"], Float[np.ndarray, "f"]]:
-    """Corners of the convex hull in a stated order, and its faces' normals and areas; of points in a plane, all points
-    and that plane."""
+) -> tuple[Float[np.ndarray, "k 3"], Float[np.ndarray, "f 3"], Float[np.ndarray, "f"], Float[np.ndarray, "e 3"]]:
+    """Corners of the convex hull in a stated order, its faces' normals and areas, and its edges; of points in a plane,
+    all points and that plane."""
     middle = points.mean(axis=0)
     mesh = Manifold.hull_points(points - middle).to_mesh64()
     corners, faces = np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts).astype(np.int64)
     if len(faces) == 0:
         normal = np.linalg.svd(points - middle)[2][-1:]
-        return points, normal, np.zeros(1)
+        return points, normal, np.zeros(1), np.zeros((0, 3))
     a, b, c = np.moveaxis(corners[faces], 1, 0)
     normals = np.cross(b - a, c - a)
     doubled = np.linalg.norm(normals, axis=1)
     real = doubled > 1e-12 * doubled.max()
-    return np.unique(corners + middle, axis=0), normals[real] / doubled[real, None], doubled[real] / 2
+    edges = np.concatenate([b - a, c - b, a - c])
+    return np.unique(corners + middle, axis=0), normals[real] / doubled[real, None], doubled[real] / 2, edges
+
+
+def _normals_of_pairs(edges: Float[np.ndarray, "e 3"]) -> Float[np.ndarray, "n 3"]:
+    """The directions at right angles to two of the longest edges each."""
+    lengths = np.linalg.norm(edges, axis=1)
+    some = np.argsort(-lengths, kind="stable")[: 6 * LONGEST_EDGES]
+    directions = _distinct(edges[some] / lengths[some, None])[:LONGEST_EDGES]
+    i, j = np.triu_indices(len(directions), 1)
+    normals = np.cross(directions[i], directions[j])
+    lengths = np.linalg.norm(normals, axis=1)
+    return normals[lengths > 1e-3] / lengths[lengths > 1e-3, None]
+
+
+def _distinct(directions: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "m 3"]:
+    """Directions of unit length, one of every two opposite ones, in the order of their coordinates."""
+    one_way = np.where(_points_down(np.round(directions, 9))[:, None], -directions, directions)
+    return one_way[np.unique(np.round(one_way, 9) + 0.0, axis=0, return_index=True)[1]]
 
 
 def _points_down(directions: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:

@@ -13,6 +13,9 @@ from ars_web.geometry.cone_intersection import ConeScene
 from ars_web.geometry.mesh_silhouette import silhouette
 from ars_web.geometry.viewing_cone import ViewingCone
 
+SLIVER = 0.1
+"""Of a volume, below which another says nothing beside it."""
+
 
 def disagreement(scene: ConeScene) -> BadInput:
     """The error that says why cones share nothing.
@@ -27,7 +30,7 @@ def disagreement(scene: ConeScene) -> BadInput:
             f"nothing that the outlines leave possible is above the support plane at z = {scene.ground:g} m; set the"
             " plane lower, or leave it out"
         )
-    misfits = [(cone.frame, _misfit(cone, rest)) for cone, rest in solids.without_each() if not rest.is_empty()]
+    misfits = [(cone.frame, _misfit(cone, rest)) for cone, rest in _suspects(solids)]
     if not misfits:
         agreeing, rest = solids.agreeing()
         misfits = [(cone.frame, _misfit(cone, rest)) for cone in scene.cones if cone not in agreeing]
@@ -35,6 +38,14 @@ def disagreement(scene: ConeScene) -> BadInput:
     misfits = [(frame, math.nan if frame == behind else px) for frame, px in misfits]
     misfits.sort(key=lambda misfit: (not math.isnan(misfit[1]), -misfit[1] if misfit[1] == misfit[1] else 0.0))
     return ViewsDisagree(_message(misfits, len(scene.cones)), tuple(misfits))
+
+
+def _suspects(solids: "_Solids") -> list[tuple[ViewingCone, Manifold]]:
+    """Each view without which the others share something, and that; of more than two views only those without which
+    they share about the most: what is left without a good view is the sliver that a bad one leaves of the object."""
+    found = [(cone, rest, rest.volume()) for cone, rest in solids.without_each() if not rest.is_empty()]
+    most = max((volume for _, _, volume in found), default=0.0)
+    return [(cone, rest) for cone, rest, volume in found if volume >= SLIVER * most or len(solids) == 2]
 
 
 def _message(misfits: Sequence[tuple[int, float]], views: int) -> str:
@@ -78,6 +89,9 @@ class _Solids:
             cone.frame: cone.solid(cone.rings, near=scene.near, far=scene.far, origin=np.zeros(3))
             for cone in scene.cones
         }
+
+    def __len__(self) -> int:
+        return len(self._scene.cones)
 
     def everything(self, *, ground: bool = True) -> Manifold:
         """A cube that holds all cones."""
