@@ -2117,7 +2117,7 @@ export interface components {
          * @description What outlines give.
          */
         HullPreviewAnswer: {
-            /** @description null: of one view, or of views that disagree */
+            /** @description null: of one view, or where `problem` says why */
             hull: components["schemas"]["PreviewedHullJson"] | null;
             /**
              * Angle Degrees
@@ -3088,7 +3088,7 @@ export interface components {
             detail: string;
             /**
              * Views
-             * @description those concerned, the worst first
+             * @description those that disagree, the worst first; none: it is something else
              */
             views: components["schemas"]["ViewMisfit"][];
         };

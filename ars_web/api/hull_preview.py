@@ -10,6 +10,7 @@ from ars_web.api.dependencies import JsonResponse, ServicesDep, StrictRoute
 from ars_web.api.mask_models import PolygonAnswer, Triple, rounded_polygons_json
 from ars_web.api.models import Strict, TransformAnswer
 from ars_web.api.problems import ViewMisfit, documented, misfits_json
+from ars_web.errors import BadInput, ViewsDisagree
 from ars_web.geometry.next_view import SuggestedView
 from ars_web.masks.hull_preview import HullPreview, preview_hull
 from ars_web.masks.masks_json import Height, ViewJson, Widening, outlines_of
@@ -66,21 +67,21 @@ class PreviewProblemJson(BaseModel):
     """Why outlines in two frames or more give no hull."""
 
     detail: str
-    views: list[ViewMisfit] = Field(description="those concerned, the worst first")
+    views: list[ViewMisfit] = Field(description="those that disagree, the worst first; none: it is something else")
 
 
 class NextViewJson(BaseModel):
     """The frame in which to draw the object next."""
 
     frame: int
-    degrees: float = Field(description="to the nearest side from which it is drawn already")
+    degrees: float | None = Field(description="to the nearest side from which it is drawn already; null: it is not")
     reason: str
 
 
 class HullPreviewAnswer(BaseModel):
     """What outlines give."""
 
-    hull: PreviewedHullJson | None = Field(description="null: of one view, or of views that disagree")
+    hull: PreviewedHullJson | None = Field(description="null: of one view, or where `problem` says why")
     angle_degrees: float | None = Field(description="between the two views that are farthest apart; null: no hull")
     overlays: list[OverlayJson]
     problem: PreviewProblemJson | None
@@ -121,13 +122,20 @@ def _json(preview: HullPreview) -> dict[str, Any]:
             {"frame": one.frame, "polygons": rounded_polygons_json(one.polygons, decimals=DECIMALS), "kind": one.kind}
             for one in preview.overlays
         ],
-        "problem": None if problem is None else {"detail": str(problem), "views": misfits_json(problem)},
-        "next_view": None if preview.next_view is None else _next_view(preview.next_view),
+        "problem": None if problem is None else {"detail": str(problem), "views": _misfits(problem)},
+        "next_view": None if preview.next_view is None else next_view_json(preview.next_view),
         "warnings": list(preview.warnings),
     }
 
 
-def _next_view(found: SuggestedView) -> dict[str, Any]:
+def _misfits(problem: BadInput) -> list[dict[str, Any]]:
+    return misfits_json(problem) if isinstance(problem, ViewsDisagree) else []
+
+
+def next_view_json(found: SuggestedView) -> dict[str, Any]:
+    """A suggested frame as NextViewJson."""
+    if math.isnan(found.angle):
+        return {"frame": found.frame, "degrees": None, "reason": f"frame {found.frame} is a good one to begin with"}
     degrees = math.degrees(found.angle)
     return {
         "frame": found.frame,

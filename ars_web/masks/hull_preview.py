@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 import shapely
 
-from ars_web.errors import BadInput, ViewsDisagree
+from ars_web.errors import BadInput
 from ars_web.geometry.box import Box
 from ars_web.geometry.camera import Camera, normalised_from_pixels, pixels_from_image
 from ars_web.geometry.hull_box import box_of_hull
@@ -26,6 +26,9 @@ SMALL_ANGLE = math.radians(60.0)
 
 DEPTHS = 100.0
 """An object is at most so many times as far from a camera as the recording is wide, and no nearer than that part."""
+
+MOST_IN_BAND = 6
+"""Views, evenly chosen, that a band is made of; it may be a little wide, not late."""
 
 AROUND = 2.0
 """Radii of the image up to which overlays are told, so that their ends are not seen in it."""
@@ -56,9 +59,9 @@ class HullPreview:
     """What outlines give.
 
     Attributes:
-        hull, box: None where there are fewer than two views, or they disagree.
+        hull, box: None where there are fewer than two views, or they give none.
         angle: radians between the two views that are farthest apart; None where there is no hull.
-        problem: why there is none, of two views or more.
+        problem: why there is none, of two views or more; ViewsDisagree where it is that.
         next_view: the frame to draw next; None where none would do more, or the views disagree.
         warnings: what is uncertain and what to do about it, in words.
     """
@@ -67,7 +70,7 @@ class HullPreview:
     box: Box | None
     angle: float | None
     overlays: tuple[Overlay, ...]
-    problem: ViewsDisagree | None
+    problem: BadInput | None
     next_view: SuggestedView | None
     warnings: tuple[str, ...]
 
@@ -78,7 +81,7 @@ def preview_hull(
     """What outlines in one view or more give, with overlays for the frames of `show_in`.
 
     Raises:
-        BadInput: an outline encloses nothing of its image, or a frame of `show_in` is not there.
+        BadInput: a frame of `show_in` is not there.
     """
     hull, problem = _hull(views, options)
     angle = None if hull is None else angle_between(views, hull.centre_of_mass)
@@ -93,12 +96,12 @@ def preview_hull(
     )
 
 
-def _hull(views: Sequence[View], options: HullOptions) -> tuple[VisualHull | None, ViewsDisagree | None]:
+def _hull(views: Sequence[View], options: HullOptions) -> tuple[VisualHull | None, BadInput | None]:
     if len(views) < 2:
         return None, None
     try:
         return visual_hull(views, widen=options.widen, ground=options.ground), None
-    except ViewsDisagree as error:
+    except BadInput as error:
         return None, error
 
 
@@ -141,12 +144,14 @@ def _corner_radius(camera: Camera) -> float:
 
 
 def _band(taken: Photographed, views: Sequence[View], options: HullOptions) -> VisualHull | None:
-    """Where the object may be by these views; None where they disagree."""
+    """Where the object may be by these views, or by some of them, which tell most of it; None where they give no
+    place."""
+    views = [views[i] for i in np.linspace(0, len(views) - 1, min(len(views), MOST_IN_BAND)).round().astype(int)]
     places = taken.frames.Ts_world_camera[:, :3, 3]
     reach = float(np.linalg.norm(places - places.mean(axis=0), axis=1).max()) or 1.0
     try:
         return band(views, depth=(reach / DEPTHS, reach * DEPTHS), widen=options.widen, ground=options.ground)
-    except ViewsDisagree:
+    except BadInput:
         return None
 
 

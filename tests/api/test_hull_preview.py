@@ -101,6 +101,28 @@ def test_views_from_one_side_are_told_without_a_misfit(client: httpx.Client, sid
     assert found["problem"]["views"] == [{"frame": 0, "misfit_px": None}, {"frame": 1, "misfit_px": None}]
 
 
+def test_a_support_plane_above_the_object_is_a_problem_of_no_view(preview) -> None:
+    found = preview(0, 3, ground=0.3, show_in=[5])
+    assert found["hull"] is None
+    assert found["problem"]["views"] == found["overlays"] == []
+    assert "set the plane lower" in found["problem"]["detail"]
+
+
+def test_an_outline_beside_the_image_is_a_problem_too(client: httpx.Client, ring: str, ring_scene) -> None:
+    beside = [{"outer": [[-90, 50], [-60, 50], [-60, 90]]}]
+    views = [{"frame": 0, "polygons": ring_scene.polygons(0)}, {"frame": 3, "polygons": beside}]
+    found = client.post(f"{ring}/hull-preview", json={"views": views, "show_in": [3]}).json()
+    assert "outline in frame 3 lies outside" in found["problem"]["detail"]
+    assert [(one["frame"], one["kind"]) for one in found["overlays"]] == [(3, "band")]
+
+
+def test_many_views_make_a_band_that_holds_the_object(preview, ring_scene) -> None:
+    found = preview(*range(12), show_in=[4])
+    ball = shapely.Polygon(ring_scene.outline(4))
+    assert overlay(found, 4, "band").area < 1.3 * ball.area
+    assert ball.difference(overlay(found, 4, "band").buffer(0.5)).area < 1
+
+
 def test_pixels_are_taken_too(client: httpx.Client, ring: str, ring_scene, preview) -> None:
     views = [{"frame": frame, "mask_png": ring_scene.png(frame)} for frame in (0, 3)]
     found = client.post(f"{ring}/hull-preview", json={"views": views}).json()
@@ -115,7 +137,6 @@ def test_pixels_are_taken_too(client: httpx.Client, ring: str, ring_scene, previ
         ({"show_in": list(range(17))}, "at most 16"),
         ({"show_in": ["0"]}, "show_in.0"),
         ({"widen_px": -1}, "widen_px"),
-        ({"ground": 5.0}, "above the support plane"),
         ({"position": "mass"}, "unknown field"),
     ],
 )
