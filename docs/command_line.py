@@ -31,7 +31,7 @@ def commands(*group: str) -> list[tuple[str, ...]]:
     """All commands below a group, in the order in which its help lists them."""
     _, _, listed = usage(*group).partition("Commands:\n")
     found: list[tuple[str, ...]] = []
-    for name in re.findall(r"^  (\w+)", listed, flags=re.MULTILINE):
+    for name in re.findall(r"^  ([\w-]+)", listed, flags=re.MULTILINE):
         found.extend(commands(*group, name) or [(*group, name)])
     return found
 

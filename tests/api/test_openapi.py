@@ -27,6 +27,7 @@ POST /api/sessions/{sid}/boxes
 GET /api/sessions/{sid}/boxes/{box_id}
 PATCH /api/sessions/{sid}/boxes/{box_id}
 DELETE /api/sessions/{sid}/boxes/{box_id}
+POST /api/sessions/{sid}/boxes/from-masks
 POST /api/sessions/{sid}/boxes/from-points
 POST /api/sessions/{sid}/undo
 POST /api/sessions/{sid}/redo
