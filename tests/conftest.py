@@ -78,15 +78,25 @@ def served():
     return _served
 
 
-@pytest.fixture(scope="session")
-def ring_scene() -> ModuleType:
-    """`ring_scene.py`: a recording round an object, with the object's outlines."""
-    spec = importlib.util.spec_from_file_location("ring_scene", Path(__file__).parent / "ring_scene.py")
+def _beside(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, Path(__file__).parent / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+@pytest.fixture(scope="session")
+def ring_scene() -> ModuleType:
+    """`ring_scene.py`: a recording round an object, with the object's outlines."""
+    return _beside("ring_scene")
+
+
+@pytest.fixture(scope="session")
+def painted_ring() -> ModuleType:
+    """`painted_ring.py`: the same recording with the object in its pictures."""
+    return _beside("painted_ring")
 
 
 def pytest_report_header() -> str:
