@@ -198,6 +198,18 @@ export class ImagePane {
     this.#turn(fitted(this.#size, this.#pane));
   }
 
+  /** Whether the whole image is seen, whatever becomes of the pane's size. */
+  get fits() {
+    return this.#fits;
+  }
+
+  /** As large as it takes to leave no room beside the image, with its middle in the middle. */
+  fill() {
+    const { width, height } = this.#size;
+    this.fit();
+    this.zoomTo(Math.max(this.#pane.width / width, this.#pane.height / height));
+  }
+
   /**
    * @param {number} zoom CSS pixels an image pixel; held between the whole image and 32
    * @param {Place} [about] what stays where it is, in the pane; its middle

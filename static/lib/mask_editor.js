@@ -159,8 +159,10 @@ export class MaskEditor {
     return this.#pane.show(address);
   }
 
+  /** The whole image; where that is seen already, as much of it as fills the pane. */
   fit() {
-    this.#pane.fit();
+    if (this.#pane.fits) this.#pane.fill();
+    else this.#pane.fit();
   }
 
   get light() {

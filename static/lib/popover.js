@@ -4,11 +4,11 @@ import { html, useEffect, useLayoutEffect, useRef } from "./view.js";
 
 /**
  * @param {{
- *   label: string, anchor: import("./view.js").RefObject<HTMLElement>, onClose: () => void,
+ *   label: string, anchor: import("./view.js").RefObject<HTMLElement>, onClose: () => void, above?: boolean,
  *   children?: import("./view.js").ComponentChildren,
  * }} props
  */
-export function Popover({ label, anchor, onClose, children }) {
+export function Popover({ label, anchor, onClose, above = false, children }) {
   const ref = useRef(/** @type {HTMLElement | null} */ (null));
   useLayoutEffect(() => {
     const panel = /** @type {HTMLElement} */ (ref.current);
@@ -16,8 +16,9 @@ export function Popover({ label, anchor, onClose, children }) {
     if (from === null) return;
     const [place, { width, height }] = [from.getBoundingClientRect(), panel.getBoundingClientRect()];
     const below = place.bottom + 4;
-    panel.style.left = `${Math.max(8, Math.min(place.right - width, innerWidth - width - 8))}px`;
-    panel.style.top = `${below + height + 8 <= innerHeight ? below : Math.max(8, place.top - height - 4)}px`;
+    const isBelow = !above && below + height + 8 <= innerHeight;
+    panel.style.left = `${Math.max(8, Math.min(above ? place.left : place.right - width, innerWidth - width - 8))}px`;
+    panel.style.top = `${isBelow ? below : Math.max(8, place.top - height - 4)}px`;
     /** @type {HTMLElement | null} */ (panel.querySelector("input, button"))?.focus();
     return () => {
       if (panel.contains(document.activeElement)) from.focus();

@@ -29,7 +29,7 @@ const listeners = new Set();
 
 export const drawing = {
   tool: signal(/** @type {ToolName} */ ("polygon")),
-  brush: signal(16),
+  brush: signal(24),
   operation: signal(/** @type {import("../../lib/mask_editor.js").Operation} */ ("add")),
 
   /** @param {string} boxKey the object's name on this page @param {number} frame */

@@ -99,7 +99,7 @@ export function MaskPane(props) {
         ${(note !== "" || locked) && html`<span class="muted note">${locked ? "locked" : note}</span>`}
       </div>
       <div class="row">
-        <button type="button" class="chip button zoom" title="Whole image (0); pixel by pixel (1)" aria-label=${`Magnified ${zoom.value.toFixed(1)} times. Show the whole image`} onClick=${() => editor?.fit()}>${zoom.value.toFixed(zoom.value < 10 ? 1 : 0)}x</button>
+        <button type="button" class="chip button zoom" title="Whole image, or as large as the pane (0: whole, 1: pixel by pixel, + and -)" aria-label=${`Magnified ${zoom.value.toFixed(1)} times. Show the whole image, or fill the pane`} onClick=${() => editor?.fit()}>${zoom.value.toFixed(zoom.value < 10 ? 1 : 0)}x</button>
         ${onClose !== undefined && html`<button type="button" class="chip button icon-only" aria-label=${`Close frame ${frame}`} title="Close this frame" onClick=${onClose}><${Icon} name="x" size=${14} /></button>`}
       </div>
     </header>

@@ -26,7 +26,7 @@ export function PhotoLight({ editor }) {
       aria-expanded=${open.value} aria-pressed=${changed} onClick=${() => (open.value = !open.value)}
     ><${Icon} name="sun" size=${14} /></button>
     ${open.value &&
-    html`<${Popover} label="Brightness and contrast" anchor=${anchor} onClose=${() => (open.value = false)}>
+    html`<${Popover} label="Brightness and contrast" anchor=${anchor} above=${true} onClose=${() => (open.value = false)}>
       <div class="photo-light">
         ${SLIDERS.map(
           ([key, title]) => html`<label key=${key}>${title}

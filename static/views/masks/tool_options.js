@@ -87,7 +87,7 @@ function Smart({ editor }) {
  * @param {(value: string) => void} props.onChoose
  */
 function Choice({ label, choices, value, onChoose }) {
-  return html`<div class="chip choice" role="group" aria-label=${label}>
+  return html`<div class="chip segments" role="group" aria-label=${label}>
     ${choices.map(([key, word, title]) => html`<button key=${key} type="button" class="button quiet" title=${title} aria-pressed=${key === value} onClick=${() => onChoose(key)}>${word}</button>`)}
   </div>`;
 }
