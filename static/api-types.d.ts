@@ -8932,7 +8932,10 @@ export interface operations {
     "hull-preview": {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /** @description a repeat with the same key answers what the first answered, and does nothing */
+                "idempotency-key"?: string | null;
+            };
             path: {
                 sid: string;
             };
@@ -9247,7 +9250,10 @@ export interface operations {
     "polygons-combine": {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /** @description a repeat with the same key answers what the first answered, and does nothing */
+                "idempotency-key"?: string | null;
+            };
             path: {
                 sid: string;
             };

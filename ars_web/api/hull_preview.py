@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter, Response
 from pydantic import BaseModel, Field
 
-from ars_web.api.dependencies import JsonResponse, ServicesDep, StrictRoute
+from ars_web.api.dependencies import IdempotencyKey, JsonResponse, ServicesDep, StrictRoute
 from ars_web.api.mask_models import PolygonAnswer, Triple, rounded_polygons_json
 from ars_web.api.models import Strict, TransformAnswer
 from ars_web.api.problems import ViewMisfit, documented, misfits_json
@@ -95,7 +95,7 @@ class HullPreviewAnswer(BaseModel):
     response_model=HullPreviewAnswer,
     responses=documented(404, 413),
 )
-def hull_preview(sid: str, draft: HullPreviewDraft, services: ServicesDep) -> Response:
+def hull_preview(sid: str, draft: HullPreviewDraft, services: ServicesDep, key: IdempotencyKey) -> Response:
     """The hull that outlines in one frame or more give, and where that puts the object in other frames. Nothing is
     stored or changed."""
     taken = photographs(services.store, sid)

@@ -7,7 +7,7 @@ import shapely
 from fastapi import APIRouter, Response
 from pydantic import Field, model_validator
 
-from ars_web.api.dependencies import JsonResponse, ServicesDep, StrictRoute
+from ars_web.api.dependencies import IdempotencyKey, JsonResponse, ServicesDep, StrictRoute
 from ars_web.api.mask_models import PolygonsAnswer, rounded_polygons_json
 from ars_web.api.models import Strict
 from ars_web.api.problems import documented
@@ -47,7 +47,7 @@ class CombineDraft(Strict):
 
 
 @router.post("/combine", operation_id="polygons-combine", response_model=PolygonsAnswer, responses=documented(404, 413))
-def combine(sid: str, draft: CombineDraft, services: ServicesDep) -> Response:
+def combine(sid: str, draft: CombineDraft, services: ServicesDep, key: IdempotencyKey) -> Response:
     """An outline with a shape added to it or taken off it, within its image. Nothing is stored or changed."""
     camera = camera_of(photographs(services.store, sid), draft.frame)
     if draft.stroke is not None:
