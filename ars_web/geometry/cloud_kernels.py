@@ -35,8 +35,9 @@ def place_run(Ts_world_camera: Array, first: int, poses: Array, centres: Array) 
 @part
 def turn_faces(planes: Array, centres: Array, turned: Array) -> None:
     """Whether each face is turned to the run's cameras, written to `turned` (f,)."""
-    x, y, z = centres[0].mean(), centres[1].mean(), centres[2].mean()
-    reach = 0.0
+    x, y, z, reach = 0.0, 0.0, 0.0, 0.0
+    for lane in range(RUN):
+        x, y, z = x + centres[0, lane] / RUN, y + centres[1, lane] / RUN, z + centres[2, lane] / RUN
     for lane in range(RUN):
         reach = max(reach, (centres[0, lane] - x) ** 2 + (centres[1, lane] - y) ** 2 + (centres[2, lane] - z) ** 2)
     reach = np.sqrt(reach) * (1.0 + 1e-9) + 1e-9
@@ -49,7 +50,8 @@ def turn_faces(planes: Array, centres: Array, turned: Array) -> None:
 def faces_lane(planes: Array, face: int, turned: Array, centres: Array, facing: Array) -> None:
     """Whether a face is turned to each of the run's cameras, written to `facing` (RUN,)."""
     if turned[face] != UNSURE:
-        facing[:] = turned[face] == TURNED
+        for lane in range(RUN):
+            facing[lane] = turned[face] == TURNED
         return
     a, b, c, d = planes[face, 0], planes[face, 1], planes[face, 2], planes[face, 3]
     for lane in range(RUN):
@@ -78,7 +80,9 @@ def grown_rows(rows: Array, used: int, more: int) -> Array:
     if used + more <= len(rows):
         return rows
     larger = np.empty((2 * len(rows) + more, rows.shape[1]), rows.dtype)
-    larger[:used] = rows[:used]
+    for i in range(used):
+        for j in range(rows.shape[1]):
+            larger[i, j] = rows[i, j]
     return larger
 
 
@@ -120,7 +124,8 @@ def cast_clouds(
                 vertex = edges[edge, end]
                 if row_of[vertex] < 0:
                     row_of[vertex], vertex_of[rows] = rows, vertex
-                    on[rows] = False
+                    for lane in range(RUN):
+                        on[rows, lane] = False
                     rows += 1
                 ends[k, 1 + end] = start + row_of[vertex]
             from_row, to_row = row_of[edges[edge, 0]], row_of[edges[edge, 1]]
@@ -166,10 +171,11 @@ def boxes_of_clouds(
     Returns those edges that may go beyond their ends, and by more than the tolerance beyond the box, on the normalised
     plane (k, 2, 2), and the frame of each (k,).
     """
-    pieces, frames, k = np.empty((64, 2, 2)), np.empty(64, np.int64), 0
+    pieces, frames, k = np.empty((64, 4)), np.empty(64, np.int64), 0
     least_u, least_v, most_u, most_v = np.empty(RUN), np.empty(RUN), np.empty(RUN), np.empty(RUN)
     for run in range(len(first_row) - 1):
-        least_u[:], least_v[:], most_u[:], most_v[:] = np.inf, np.inf, -np.inf, -np.inf
+        for lane in range(RUN):
+            least_u[lane], least_v[lane], most_u[lane], most_v[lane] = np.inf, np.inf, -np.inf, -np.inf
         for row in range(first_row[run], first_row[run + 1]):
             # NaN is neither less nor more.
             for lane in range(RUN):
@@ -202,14 +208,17 @@ def boxes_of_clouds(
                     bbox[frame],
                 ):
                     if k == len(pieces):
-                        more_pieces, more_frames = np.empty((2 * k, 2, 2)), np.empty(2 * k, np.int64)
-                        more_pieces[:k], more_frames[:k] = pieces, frames
+                        more_pieces, more_frames = np.empty((2 * k, 4)), np.empty(2 * k, np.int64)
+                        for j in range(k):
+                            more_frames[j] = frames[j]
+                            for axis in range(4):
+                                more_pieces[j, axis] = pieces[j, axis]
                         pieces, frames = more_pieces, more_frames
-                    pieces[k, 0, 0], pieces[k, 0, 1] = x[a, lane], y[a, lane]
-                    pieces[k, 1, 0], pieces[k, 1, 1] = x[b, lane], y[b, lane]
+                    pieces[k, 0], pieces[k, 1] = x[a, lane], y[a, lane]
+                    pieces[k, 2], pieces[k, 3] = x[b, lane], y[b, lane]
                     frames[k] = frame
                     k += 1
-    return pieces[:k].copy(), frames[:k].copy()
+    return pieces[:k].copy().reshape((k, 2, 2)), frames[:k].copy()
 
 
 @part

@@ -126,8 +126,23 @@ def grown(pieces: Array, k: int, more: int) -> Array:
     if k + more <= len(pieces):
         return pieces
     larger = np.empty((2 * len(pieces) + more, 2, 2))
-    larger[:k] = pieces[:k]
+    for i in range(k):
+        for end in range(2):
+            larger[i, end, 0], larger[i, end, 1] = pieces[i, end, 0], pieces[i, end, 1]
     return larger
+
+
+@part
+def falling_order(keys: Array, n: int) -> Array:
+    """The numbers of the first n keys, the largest first. There are few."""
+    order = np.arange(n)
+    for i in range(1, n):
+        j, one = i, order[i]
+        while j > 0 and keys[order[j - 1]] < keys[one]:
+            order[j] = order[j - 1]
+            j -= 1
+        order[j] = one
+    return order
 
 
 @part
@@ -143,14 +158,15 @@ def cut_at_rim(pieces: Array, first: int, k: int, rim: float, quarter: int) -> t
         low, high = within_disc(rim, x0, y0, x1, y1)
         if low > high:
             continue
-        dx, dy = x1 - x0, y1 - y0
-        pieces[k] = whole[i]
-        for end, s, cut in ((0, low, low > 0.0), (1, high, high < 1.0)):
-            if cut:
-                pieces[k, end, 0], pieces[k, end, 1] = x0 + s * dx, y0 + s * dy
-                ends[n] = pieces[k, end]
-                angles[n], turns[n] = math.atan2(ends[n, 1], ends[n, 0]), 1 if end == 1 else -1
+        for end in range(2):
+            s = low if end == 0 else high
+            x, y = (x0, y0) if end == 0 else (x1, y1)
+            if 0.0 < s < 1.0:
+                x, y = x0 + s * (x1 - x0), y0 + s * (y1 - y0)
+                ends[n, 0], ends[n, 1] = x, y
+                angles[n], turns[n] = math.atan2(y, x), 2 * end - 1
                 n += 1
+            pieces[k, end, 0], pieces[k, end, 1] = x, y
         k += 1
     step = 0.5 * math.pi / quarter
     if n == 0:
@@ -164,7 +180,7 @@ def cut_at_rim(pieces: Array, first: int, k: int, rim: float, quarter: int) -> t
                 k += 1
         return pieces, k
     # Angles grow clockwise, y being down: the border runs towards smaller ones.
-    order = np.argsort(-angles[:n])
+    order = falling_order(angles, n)
     widest, at = -1.0, 0
     for i in range(n):
         gap = angles[order[i]] - angles[order[(i + 1) % n]] + (2.0 * math.pi if i == n - 1 else 0.0)
@@ -181,7 +197,7 @@ def cut_at_rim(pieces: Array, first: int, k: int, rim: float, quarter: int) -> t
             end -= 2.0 * math.pi
         for _ in range(level):
             pieces = grown(pieces, k, 4 * quarter + 2)
-            pieces[k, 0] = ends[here]
+            pieces[k, 0, 0], pieces[k, 0, 1] = ends[here, 0], ends[here, 1]
             place = math.ceil(start / step - 1e-9) - 1
             while place * step > end + 1e-9 * step:
                 x, y = rim * math.cos(place * step), rim * math.sin(place * step)
@@ -189,7 +205,7 @@ def cut_at_rim(pieces: Array, first: int, k: int, rim: float, quarter: int) -> t
                 pieces[k + 1, 0, 0], pieces[k + 1, 0, 1] = x, y
                 k += 1
                 place -= 1
-            pieces[k, 1] = ends[there]
+            pieces[k, 1, 0], pieces[k, 1, 1] = ends[there, 0], ends[there, 1]
             k += 1
     return pieces, k
 

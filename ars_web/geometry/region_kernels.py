@@ -136,7 +136,13 @@ def crossings(active: Array, n: int, top: Array, bottom: Array) -> Array:
                 found[k] = a / (a - b)
                 k += 1
     found[k] = 1.0
-    return np.sort(found[: k + 1])
+    for i in range(1, k):
+        j, one = i, found[i]
+        while j > 0 and found[j - 1] > one:
+            found[j] = found[j - 1]
+            j -= 1
+        found[j] = one
+    return found[: k + 1]
 
 
 @part
@@ -149,13 +155,13 @@ def areas(width: float, height: float, sides: Array) -> tuple[float, float]:
     n = len(sides)
     upper, lower, turns = np.empty(n), np.empty(n), np.empty(n, np.int64)
     # Each end of a side is another's start.
-    levels = np.empty(n + 2)
+    starts = np.empty(n + 2)
     for i in range(n):
         v0, v1 = sides[i, 1], sides[i, 3]
         upper[i], lower[i], turns[i] = min(v0, v1), max(v0, v1), -1 if v0 > v1 else 1
-        levels[i] = v0
-    levels[n], levels[n + 1] = 0.0, height
-    levels.sort()
+        starts[i] = v0
+    starts[n], starts[n + 1] = 0.0, height
+    levels = starts[np.argsort(starts)]
     order = np.argsort(upper)
     top, bottom, keys = np.empty(n), np.empty(n), np.empty(n)
     active = np.empty(n, np.int64)
