@@ -309,7 +309,7 @@ class ObjectBoxes:
                 return make(self._store.state(sid))
             except Conflict:
                 if not still(self._store.state(sid)):
-                    raise
+                    break  # once more all the same: it then says what of the caller's own moved on
         return make(self._store.state(sid))
 
 
