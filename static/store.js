@@ -23,23 +23,10 @@ import { computed, signal } from "./lib/view.js";
 /** @typedef {{frame: number, polygons: readonly Polygon[]}} MaskView */
 /** What an object looks like in one frame, as far as a person has said. @typedef {{rectangle?: [number, number, number, number], inside?: Corner[][], outside?: Corner[][], brush_width?: number, start?: Polygon[]}} SegmentPrompt */
 
-/** What outlines give, before anything of it is stored. @typedef {Schemas["HullPreviewAnswer"] & {next_view?: {frame: number, degrees: number, reason: string} | null}} HullPreview */
+/** What outlines give, before anything of it is stored. @typedef {Schemas["HullPreviewAnswer"]} HullPreview */
 
-/**
- * Masks being made by the server in further frames.
- * @typedef {object} OutlineJob
- * @property {string} id
- * @property {"queued" | "running" | "done" | "failed" | "cancelled"} state
- * @property {number} done
- * @property {number} total
- * @property {number | null} seconds_left
- * @property {number[]} accepted frames
- * @property {number[]} doubtful frames whose masks wait for a yes or a no
- * @property {{frame: number, reason: string}[]} dropped
- * @property {string | null} error
- */
-
-/** How well a box fits what was drawn; pixels. @typedef {{box: Box, residuals: {frame: number, px: number[], rms_px: number, outlier: boolean}[], rms_px: number, moved_mm: number, warnings: string[]}} Refinement */
+/** Masks being made by the server in further frames. @typedef {Schemas["OutlineJobAnswer"]} OutlineJob */
+/** How well a box fits what was drawn. @typedef {Schemas["RefinedAnswer"]} Refinement */
 
 /**
  * A box's place and size while it is dragged or typed; nothing of it is stored yet.

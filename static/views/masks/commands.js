@@ -2,7 +2,7 @@
 
 import * as store from "../../store.js";
 import { drawing, TOOLS } from "./drawing.js";
-import { activate, active, activeFrame, addView, panes } from "./panes.js";
+import { activate, active, activeFrame, openView, panes } from "./panes.js";
 import { guidance } from "./guidance.js";
 import { subject } from "./subject.js";
 
@@ -23,8 +23,8 @@ export const maskCommands = [
     title: "Open the best next view",
     group: "Masks",
     keys: ["W"],
-    run: () => addView(guidance.value?.next_view?.frame ?? null),
-    when: inMasks,
+    run: () => openView(guidance.value?.next_view?.frame ?? activeFrame()),
+    when: () => inMasks() && (guidance.value?.next_view ?? null) !== null,
   },
   {
     id: "mask-next-pane",

@@ -45,7 +45,7 @@ export function MasksList({ subject }) {
     html`<ul class="masks-list">
       ${rows.map((row) => html`<${Row} key=${row.frame} ...${row} color=${subject.color} refusal=${refused.value.get(place(subject.key, row.frame))} tried=${tried} />`)}
     </ul>`}
-    ${doubtful > 0 && html`<p class="muted doubts">${plural(doubtful, "mask waits", "masks wait")} for a yes or a no: they do not count yet.</p>`}
+    ${doubtful > 0 && html`<p class="muted doubts">${doubtful === 1 ? "One mask waits for a yes or a no: it does" : `${doubtful} masks wait for a yes or a no: they do`} not count yet.</p>`}
     ${problem !== undefined &&
     html`<p class="problem dismissible" role="alert">${problem}
       <button class="button link" onClick=${() => store.setProblem("masks", null)}>Dismiss</button>

@@ -8,7 +8,7 @@ import * as guidance from "./guidance.js";
 import { MaskPane } from "./pane.js";
 import { activate, active, arrange, close, follow, leave, MOST, open, panes, searching, show } from "./panes.js";
 import * as saving from "./saving.js";
-import { begin, subject } from "./subject.js";
+import { begin, giveUp, subject } from "./subject.js";
 
 export function MasksMode() {
   const root = useRef(/** @type {HTMLElement | null} */ (null));
@@ -17,6 +17,7 @@ export function MasksMode() {
     open();
     return () => {
       leave();
+      giveUp();
       for (const stop of stops) stop();
     };
   }, []);
@@ -82,8 +83,9 @@ const WORDS = { drawn: "drawn", smart: "drawn with the smart tool", proposed: "o
 function problemOf(key, frame) {
   const told = saving.refused.value.get(saving.place(key, frame));
   if (told !== undefined) return told;
-  const view = guidance.guidance.value?.problem?.views.find((one) => one.frame === frame);
-  return view === undefined ? null : saving.misfitWords(view.misfit_px, null);
+  const problem = guidance.guidance.value?.problem ?? null;
+  const view = problem?.views.find((one) => one.frame === frame);
+  return problem === null || view === undefined ? null : saving.misfitWords(view.misfit_px, problem.detail);
 }
 
 const NAMES = ["One frame", "Two frames side by side", "Three frames", "Four frames"];

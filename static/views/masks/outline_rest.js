@@ -60,7 +60,7 @@ export function OutlineRest({ job, id }) {
     const left = job.seconds_left === null ? "" : `, ${leftInWords(job.seconds_left)}`;
     return html`<div class="outline-job">
       <progress max=${Math.max(1, job.total)} value=${job.done} aria-label="Outlining the rest"></progress>
-      <div class="row"><span class="muted" role="status">${job.total === 0 ? "Choosing frames" : `${job.done} of ${plural(job.total, "frame")}${left}`}</span>
+      <div class="row"><span class="muted" role="status">${job.total === 0 ? "Choosing frames" : `${job.done} of ${plural(job.total, "step")}${left}`}</span>
         <button class="button link" onClick=${() => store.actions.cancelOutline(job.id).catch((error) => put(id, { problem: error.message }))}>Cancel</button>
       </div>
     </div>`;
@@ -74,9 +74,15 @@ export function OutlineRest({ job, id }) {
   ];
   return html`<div class="outline-job">
     <p class="row"><span role="status">${words.join(", ")}.</span>${dismiss}</p>
-    ${job.dropped.length > 0 &&
-    html`<details><summary class="muted">Why some were dropped</summary>
-      <ul>${job.dropped.map(({ frame, reason }) => html`<li key=${frame}><button class="button link" onClick=${() => openView(frame)}>Frame ${frame}</button> <span class="muted">${reason}</span></li>`)}</ul>
-    </details>`}
+    <${Reasons} words="Why some are to be looked at" reasons=${job.doubts} />
+    <${Reasons} words="Why some were dropped" reasons=${job.dropped} />
   </div>`;
+}
+
+/** @param {{words: string, reasons: readonly {frame: number, reason: string}[]}} props */
+function Reasons({ words, reasons }) {
+  if (reasons.length === 0) return null;
+  return html`<details><summary class="muted">${words}</summary>
+    <ul>${reasons.map(({ frame, reason }) => html`<li key=${frame}><button class="button link" onClick=${() => openView(frame)}>Frame ${frame}</button> <span class="muted">${reason}</span></li>`)}</ul>
+  </details>`;
 }

@@ -6,7 +6,7 @@
 import { batch, effect, signal } from "../../lib/view.js";
 import * as store from "../../store.js";
 import { drawing } from "./drawing.js";
-import { adopt, idOf, keyOf } from "./subject.js";
+import { adopt, disown, idOf, keyOf } from "./subject.js";
 
 /** @typedef {import("../../store.js").Polygon} Polygon */
 
@@ -80,7 +80,12 @@ async function send(key, frame) {
       sent = /** @type {readonly Polygon[]} */ (going.get(at));
       const known = stored(key, frame);
       if (sent.length === 0) {
-        if (known !== undefined) await store.actions.deleteMask(known.id);
+        if (known !== undefined) {
+          const id = known.box_id;
+          const isLast = !store.boxes.peek().has(id) && [...store.masks.peek().values()].every((mask) => mask.id === known.id || mask.box_id !== id);
+          if (isLast && keyOf(id) === key && !key.startsWith("box-")) disown(key, id, known.class_id);
+          await store.actions.deleteMask(known.id);
+        }
         shown.delete(at);
       } else if (known === undefined || !known.accepted || !same(known.polygons, sent)) {
         const id = idOf(key);
@@ -111,14 +116,16 @@ async function send(key, frame) {
  */
 function refuse(key, frame, { message, views = [] }) {
   const next = new Map(refused.value).set(place(key, frame), `Not stored: ${message}`);
-  for (const view of views) next.set(place(key, view.frame), misfitWords(view.misfit_px, view.frame === frame ? `Not stored: ${message}` : null));
+  for (const { frame: concerned, misfit_px } of views) {
+    const words = misfitWords(misfit_px, message);
+    next.set(place(key, concerned), concerned === frame ? `Not stored: ${words}` : words);
+  }
   refused.value = next;
 }
 
-/** What a view is told that disagrees with others. @param {number | null} px @param {string | null} detail */
+/** What is said on a view that disagrees with others. @param {number | null} px @param {string} detail of all that is wrong */
 export function misfitWords(px, detail) {
-  const by = px === null ? "This outline cannot be of the same object as the others." : `This outline misses the others by ${px.toFixed(px < 10 ? 1 : 0)} px.`;
-  return detail === null ? `${by} Mend it, or the one it disagrees with.` : `${by} ${detail}`;
+  return px === null ? detail : `this outline misses the others by ${px.toFixed(px < 10 ? 1 : 0)} px: mend it, or the one that it disagrees with`;
 }
 
 /** @param {string} key */

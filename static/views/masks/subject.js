@@ -52,6 +52,15 @@ export function begin(class_id) {
   });
 }
 
+/** Let go of a new object of which nothing is stored. */
+export function giveUp() {
+  if (store.selected.value !== store.NEW) return;
+  batch(() => {
+    store.selected.value = null;
+    store.newClass.value = null;
+  });
+}
+
 /** The new object of `key` got its id with its first mask. @param {string} key @param {number} id */
 export function adopt(key, id) {
   batch(() => {
@@ -59,6 +68,19 @@ export function adopt(key, id) {
     if (store.selected.value !== store.NEW || newKey.value !== key) return;
     store.selected.value = id;
     store.newClass.value = null;
+  });
+}
+
+/** The new object of `key` is about to lose the last that is stored of it: it is new again, with the same drawing. @param {string} key @param {number} id @param {number} class_id */
+export function disown(key, id, class_id) {
+  batch(() => {
+    const left = new Map(keys.value);
+    left.delete(id);
+    keys.value = left;
+    if (store.selected.value !== id) return;
+    newKey.value = key;
+    store.newClass.value = class_id;
+    store.selected.value = store.NEW;
   });
 }
 

@@ -25,11 +25,11 @@ export function Views({ subject }) {
   return html`<section class="panel-section views-section" aria-label="Views">
     <h2 class="heading section-head">Views</h2>
     <dl class="views-facts">
-      <div><dt>Angle between views</dt><dd class=${isNarrow ? "narrow" : ""}>${angle === null ? html`<span class="muted">needs two masks</span>` : `${angle.toFixed(0)}°${isNarrow ? ", narrow" : ""}`}</dd></div>
+      <div><dt>Angle between views</dt><dd class=${isNarrow ? "narrow" : ""}>${angle === null ? html`<span class="muted">${views.value.length < 2 ? "needs two masks" : "not known yet"}</span>` : `${angle.toFixed(0)}°${isNarrow ? ", narrow" : ""}`}</dd></div>
       <div><dt>Hull so far</dt><dd title=${told?.hull ? `${volumeText(told.hull.volume)}` : undefined}>${hullText(told)}</dd></div>
       <div><dt>Best next view</dt><dd>
         ${next === null
-          ? html`<span class="muted">${views.value.length === 0 ? "after the first mask" : "none is better"}</span>`
+          ? html`<span class="muted">${told?.problem ? "once the views agree" : views.value.length === 0 ? "after the first mask" : "none is better"}</span>`
           : html`<button class="button link" title=${next.reason} onClick=${() => openView(next.frame)}>Frame ${next.frame}</button>`}
       </dd></div>
     </dl>
