@@ -5,10 +5,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 from jaxtyping import Float, Int
 from manifold3d import Manifold, OpType
 
-from ars_web.geometry.viewing_cone import ViewingCone
+from ars_web.geometry.viewing_cone import ViewingCone, rings_of
 
 SMALLEST_ANGLE = math.radians(5)
 """Between two views. Below it, an outline's error of a pixel moves the hull's ends by more than its width."""
@@ -21,6 +22,9 @@ NEAR_FAR = 1e-6
 
 DEPTH_MARGIN = 0.05
 """Of its depth, by which a cone is longer than what it must reach."""
+
+WIDEST_WINDOW = 1e3
+"""In the normalised plane: 89.9 degrees off the axis."""
 
 OPEN_REACH = 3.0
 """How much larger than what is seen of it an object may be that goes on beyond the image and that nothing bounds."""
@@ -89,13 +93,21 @@ def intersection(scene: ConeScene) -> Solid | None:
         return None
     middle = (bounds.min(axis=0) + bounds.max(axis=0)) / 2
     solids = [] if cap is None else [_cuboid(cap, middle)]
-    for cone in closed:
+    taken: list[Manifold] = []
+    for cone in scene.cones:
         near, far = _depth_range(cone, bounds, scene)
-        solids.append(cone.solid(cone.rings, near=near, far=far, origin=middle))
+        if not cone.is_open:
+            solids.append(cone.solid(cone.rings, near=near, far=far, origin=middle))
+        elif (beside := _beside(cone, bounds, scene)) is not None:
+            solids.append(cone.solid(beside, near=near, far=far, origin=middle))
+        elif background := rings_of(cone.background):
+            taken.append(cone.solid(background, near=scene.near, far=far, origin=middle))
     hull = Manifold.batch_boolean(solids, OpType.Intersect)
     if scene.ground is not None:
         hull = hull.trim_by_plane((0.0, 0.0, 1.0), scene.ground - middle[2])
-    hull = _beside_backgrounds(hull, scene, bounds, middle)
+    for solid in taken:
+        hull = hull - solid
+    hull = _seen(hull, [cone for cone in scene.cones if cone.is_open], scene, middle)
     if hull.is_empty() or not hull.volume() > 0:
         return None
     mesh = hull.to_mesh64()
@@ -108,28 +120,42 @@ def _widest_baseline(cones: Sequence[ViewingCone]) -> float:
     return float(np.linalg.norm(centres[:, None] - centres[None], axis=-1).max())
 
 
-def _beside_backgrounds(
-    hull: Manifold, scene: ConeScene, bounds: Float[np.ndarray, "n 3"], origin: Float[np.ndarray, "3"]
-) -> Manifold:
-    """A hull without what cameras with open cones see beside their masks, and without the pieces that none of these
-    masks shows anything of: an object is one thing, and is seen."""
-    opened = [cone for cone in scene.cones if cone.is_open]
-    if not opened:
+def _beside(
+    cone: ViewingCone, bounds: Float[np.ndarray, "n 3"], scene: ConeScene
+) -> tuple[Float[np.ndarray, "k 2"], ...] | None:
+    """The rings of all of the normalised plane but an open cone's background, as far as the corners in the world of
+    what the object is within reach there; None where they reach behind the camera, which no such rings can tell."""
+    if not cone.depths(bounds).min() > scene.near:
+        return None
+    flat = cone.flat(bounds)
+    if not np.abs(flat).max() < WIDEST_WINDOW:
+        return None
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    more = DEPTH_MARGIN * (high - low)
+    return rings_of(shapely.box(*(low - more), *(high + more)).difference(cone.background)) or None
+
+
+def _seen(hull: Manifold, opened: Sequence[ViewingCone], scene: ConeScene, origin: Float[np.ndarray, "3"]) -> Manifold:
+    """A hull without the pieces that some open cone's mask shows nothing of: an object is one thing, and is seen."""
+    if not opened or hull.is_empty():
         return hull
-    taken: list[Manifold] = []
-    for cone in opened:
-        far = max(float(cone.depths(bounds).max()), 0.0) * (1 + DEPTH_MARGIN)
-        if cone.background and far > scene.near:
-            taken.append(cone.solid(cone.background, near=scene.near, far=far, origin=origin))
-    hull = Manifold.batch_boolean([hull, *taken], OpType.Subtract)
     pieces = hull.decompose()
     for cone in opened:
-        far = max(float(cone.depths(bounds).max()), 0.0) * (1 + DEPTH_MARGIN)
-        if far <= scene.near:
-            return Manifold()
-        shown = cone.solid(cone.rings, near=scene.near, far=far, origin=origin)
-        pieces = [piece for piece in pieces if not (piece ^ shown).is_empty()]
+        pieces = [piece for piece in pieces if _shows(cone, piece, scene, origin)]
     return Manifold.batch_boolean(pieces, OpType.Add) if pieces else Manifold()
+
+
+def _shows(cone: ViewingCone, piece: Manifold, scene: ConeScene, origin: Float[np.ndarray, "3"]) -> bool:
+    """Whether a mask shows anything of a solid: one of its corners, as a rule."""
+    corners = corners_of(piece) + origin
+    depths = cone.depths(corners)
+    far = float(depths.max()) * (1 + DEPTH_MARGIN)
+    if far <= scene.near:
+        return False
+    flat = cone.flat(corners[depths > scene.near])
+    if shapely.contains_xy(cone.shown, flat[:, 0], flat[:, 1]).any():
+        return True
+    return not (piece ^ cone.solid(cone.rings, near=scene.near, far=far, origin=origin)).is_empty()
 
 
 def _frame_solid(cone: ViewingCone, scene: ConeScene, origin: Float[np.ndarray, "3"]) -> Manifold:
@@ -147,7 +173,12 @@ def _trimmed(
         shared = shared.trim_by_plane((0.0, 0.0, 1.0), scene.ground - origin[2])
     if shared.is_empty():
         return None
-    return np.asarray(shared.to_mesh64().vert_properties)[:, :3] + origin
+    return corners_of(shared) + origin
+
+
+def corners_of(solid: Manifold) -> Float[np.ndarray, "v 3"]:
+    """Its vertices."""
+    return np.asarray(solid.to_mesh64().vert_properties)[:, :3]
 
 
 def _cuboid(bounds: tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]], origin: Float[np.ndarray, "3"]) -> Manifold:

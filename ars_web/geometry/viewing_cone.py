@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 import shapely
@@ -11,6 +11,7 @@ from manifold3d import Error, Manifold, Mesh64, triangulate
 
 from ars_web.errors import BadInput
 from ars_web.geometry import camera as cameras
+from ars_web.geometry import rigid_transform
 from ars_web.geometry.camera import Camera
 from ars_web.geometry.mask_regions import multipolygon, region
 from ars_web.geometry.polygon import Polygon
@@ -43,18 +44,24 @@ class ViewingCone:
     Attributes:
         frame: its index, for messages.
         mask: widened, in image coordinates, cut to what the camera sees; not simplified.
-        rings: the mask's rings in the normalised plane, simplified, those of holes the other way round.
-        background: the rings of what the camera sees beside a mask that touches the border: all that is known then is
-            that the object is not there. Empty where the mask touches no border.
+        shown: the mask in the normalised plane, simplified.
+        background: of a mask that touches the border, in the normalised plane, what the camera sees beside it: all that
+            is known then is that the object is not there. Empty of other masks.
+        is_open: whether the mask touches the border.
     """
 
     frame: int
     camera: Camera
     T_world_camera: Transform
     mask: shapely.MultiPolygon
-    rings: tuple[Float[np.ndarray, "k 2"], ...]
-    background: tuple[Float[np.ndarray, "m 2"], ...]
+    shown: shapely.MultiPolygon
+    background: shapely.MultiPolygon
     is_open: bool
+
+    @cached_property
+    def rings(self) -> tuple[Float[np.ndarray, "k 2"], ...]:
+        """Those of `shown`, the outer ones counter-clockwise in (x, y) and holes clockwise."""
+        return rings_of(self.shown)
 
     @property
     def centre_world(self) -> Float[np.ndarray, "3"]:
@@ -75,6 +82,11 @@ class ViewingCone:
         points = np.concatenate(self.rings)
         (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
         return (np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]]),)
+
+    def flat(self, points_world: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 2"]:
+        """Points before the camera on its normalised plane."""
+        points = rigid_transform.transform_points(rigid_transform.invert(self.T_world_camera), points_world)
+        return points[:, :2] / points[:, 2:]
 
     def depths(self, points_world: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n"]:
         """How far points are before the camera, along its axis."""
@@ -151,8 +163,8 @@ def cone_of_mask(
         camera,
         T_world_camera,
         mask,
-        normalised_rings(camera, simple),
-        normalised_rings(camera, background),
+        undistorted(camera, simple),
+        undistorted(camera, background),
         touches,
     )
 
@@ -188,26 +200,31 @@ def simplified(mask: shapely.MultiPolygon) -> shapely.MultiPolygon:
     return level if not level.is_empty else simple
 
 
-def normalised_rings(camera: Camera, mask: shapely.MultiPolygon) -> tuple[Float[np.ndarray, "k 2"], ...]:
-    """The rings of a mask in the normalised plane, outer ones counter-clockwise in (x, y) and holes clockwise; a
-    straight edge has as many corners as the lens bends it."""
-    bent = [
-        shapely.Polygon(
-            _undistorted(camera, shapely.get_coordinates(piece.exterior)[:-1]),
-            [_undistorted(camera, shapely.get_coordinates(hole)[:-1]) for hole in piece.interiors],
-        )
-        for piece in mask.geoms
-    ]
-    if not bent:
-        return ()
-    whole = shapely.MultiPolygon(bent)
-    if not whole.is_valid:
-        # Where two edges nearly meet, their chords may cross.
-        whole = shapely.make_valid(whole)
-    parts = [part for part in shapely.get_parts(shapely.get_parts(whole)) if isinstance(part, shapely.Polygon)]
-    oriented = shapely.orient_polygons(np.array(parts))
+def undistorted(camera: Camera, mask: shapely.MultiPolygon) -> shapely.MultiPolygon:
+    """A mask in the normalised plane; a straight edge has as many corners as the lens bends it."""
+    bent = shapely.MultiPolygon(
+        [
+            shapely.Polygon(
+                _undistorted(camera, shapely.get_coordinates(piece.exterior)[:-1]),
+                [_undistorted(camera, shapely.get_coordinates(hole)[:-1]) for hole in piece.interiors],
+            )
+            for piece in mask.geoms
+        ]
+    )
+    # Where two edges nearly meet, their chords may cross.
+    return bent if bent.is_valid else _areas(shapely.make_valid(bent))
+
+
+def rings_of(region: shapely.Geometry) -> tuple[Float[np.ndarray, "k 2"], ...]:
+    """The rings of a region's areas, outer ones counter-clockwise in (x, y) and holes clockwise."""
+    oriented = [shapely.orient_polygons(part) for part in _areas(region).geoms]
     rings = [ring for part in oriented for ring in (part.exterior, *part.interiors)]
     return tuple(np.ascontiguousarray(shapely.get_coordinates(ring)[:-1]) for ring in rings)
+
+
+def _areas(geometry: shapely.Geometry) -> shapely.MultiPolygon:
+    parts = shapely.get_parts(shapely.get_parts(geometry))
+    return shapely.MultiPolygon([part for part in parts if isinstance(part, shapely.Polygon)])
 
 
 def _undistorted(camera: Camera, ring: Float[np.ndarray, "k 2"]) -> Float[np.ndarray, "m 2"]:

@@ -385,9 +385,7 @@ def test_random_scenes(seed: int, count: int, size: float, lens: str, hulls):
     assert "nearly the same side" in said or "leave open" in said or not said
 
 
-def check_random_hull(
-    hull: VisualHull, views: list[View], random: np.random.Generator, size: float, lump, hulls
-) -> None:
+def check_random_hull(hull: VisualHull, views: list[View], around: np.ndarray, lump, hulls) -> None:
     assert is_closed(hull)
     around = np.concatenate([around, np.asarray(lump.vertices)])
     asked = hulls.ask(views, around)
