@@ -17,7 +17,7 @@ Pixels
     Inside `camera.py` a pixel's centre is at integers (OpenCV's, what `K` means). Everything that leaves
     the geometry for a user, a file or the API is an image coordinate: (0, 0) is the image's top left corner
     and (W, H) its bottom right; `camera.image_from_pixels` and `camera.pixels_from_image` convert, and nothing
-    else does. `labels.py` returns image coordinates.
+    else does. `labels.py` and `mesh_labels.py` return image coordinates.
 
 Labels
     `bbox_amodal` is the whole object's box, unclipped; `bbox` is the box of the part of the object that lies
