@@ -17,6 +17,9 @@ further off is something else as often as not."""
 LEAST_MARGIN = 8
 """Pixels."""
 
+LARGEST_SCALE = 2.0
+"""A small part is enlarged, so that its outline can run between its pixels."""
+
 REACH_OF_STROKES = 120
 """Pixels round scribbles within which the object is looked for, where there is no rectangle."""
 
@@ -60,7 +63,8 @@ class PromptPart:
     def of(self, image: UInt8[np.ndarray, "h w 3"]) -> UInt8[np.ndarray, "r c 3"]:
         """The part of a photograph."""
         window = image[self.y0 : self.y1, self.x0 : self.x1]
-        return np.ascontiguousarray(cv2.resize(window, self.shape[::-1], interpolation=cv2.INTER_AREA))
+        smooth = cv2.INTER_AREA if self.scale[0] <= 1 else cv2.INTER_LINEAR
+        return np.ascontiguousarray(cv2.resize(window, self.shape[::-1], interpolation=smooth))
 
     def of_mask(self, mask: Bool[np.ndarray, "h w"]) -> Bool[np.ndarray, "r c"]:
         """The part of a mask."""
@@ -110,7 +114,7 @@ def prompt_part(
     right, bottom = min(width, int(np.ceil(x1 + margin))), min(height, int(np.ceil(y1 + margin)))
     if square:
         return PromptPart(left, top, right, bottom, (longest_side, longest_side), reach)
-    scale = min(1.0, longest_side / max(right - left, bottom - top))
+    scale = min(LARGEST_SCALE, longest_side / max(right - left, bottom - top))
     shape = (max(1, round((bottom - top) * scale)), max(1, round((right - left) * scale)))
     return PromptPart(left, top, right, bottom, shape, reach)
 

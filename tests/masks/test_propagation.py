@@ -128,10 +128,14 @@ def test_fewer_than_one_frame_is_refused(painted, frames_most):
 
 
 def test_drawn_outlines_that_do_not_meet_are_refused(painted):
-    there = painted.view(4)
-    low = tuple(replace(polygon, outer=polygon.outer * (1, 0.2) + (0, 190)) for polygon in there.polygons)
+    """The upper edge of one image, and the lower edge of another one from as high up."""
+    drawn = [painted.view(0), painted.view(4)]
+    flat = [
+        replace(view, polygons=tuple(replace(p, outer=p.outer * (1, 0.2) + (0, y)) for p in view.polygons))
+        for view, y in zip(drawn, (0, 190), strict=True)
+    ]
     with pytest.raises(ViewsDisagree):
-        propagate([painted.view(0), replace(there, polygons=low)], painted.taken, read=painted.read)
+        propagate(flat, painted.taken, read=painted.read)
 
 
 def test_no_other_frame_is_told_with_the_remedy(painted):
