@@ -8550,7 +8550,10 @@ export interface operations {
     "frames-segment": {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /** @description a repeat with the same key answers what the first answered, and does nothing */
+                "idempotency-key"?: string | null;
+            };
             path: {
                 sid: string;
                 index: number;
@@ -8661,7 +8664,7 @@ export interface operations {
         };
         requestBody?: {
             content: {
-                "application/json": components["schemas"]["OutlineRestDraft"] | null;
+                "application/json": components["schemas"]["OutlineRestDraft"];
             };
         };
         responses: {
@@ -8846,7 +8849,10 @@ export interface operations {
     "outline-jobs-cancel": {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /** @description a repeat with the same key answers what the first answered, and does nothing */
+                "idempotency-key"?: string | null;
+            };
             path: {
                 sid: string;
                 job_id: string;

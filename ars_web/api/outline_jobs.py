@@ -22,6 +22,9 @@ class OutlineRestDraft(Strict):
     )
 
 
+AS_A_RULE = OutlineRestDraft()  # pyright: ignore[reportCallIssue]: it knows no defaults behind Annotated
+
+
 class FrameReasonAnswer(BaseModel):
     """A frame and what is to be said of its outline."""
 
@@ -80,7 +83,7 @@ def outline_rest(
     services: ServicesDep,
     author: AuthorDep,
     key: IdempotencyKey,
-    draft: OutlineRestDraft | None = None,
+    draft: OutlineRestDraft = AS_A_RULE,
 ) -> OutlineJobAnswer:
     """Outline an object in further frames, beginning from its masks that count, two at least; ask for the job again
     to see how far it is.
@@ -88,8 +91,7 @@ def outline_rest(
     All its outlines, the hull and the box are stored in one edit at the end, or nothing is. The box may be one that
     is not made yet, of which there are masks only: it is made then. A box that was placed by hand stays where it is.
     """
-    frames_most = FRAMES_MOST if draft is None else draft.frames_most
-    job = services.outlines.start(sid, box_id, frames_most=frames_most, author=author, key=key)
+    job = services.outlines.start(sid, box_id, frames_most=draft.frames_most, author=author, key=key)
     response.headers["Location"] = f"/api/sessions/{sid}/outline-jobs/{job.id}"
     return OutlineJobAnswer.of(job)
 
@@ -101,6 +103,6 @@ def get(sid: str, job_id: str, services: ServicesDep) -> OutlineJobAnswer:
 
 
 @router.post("/outline-jobs/{job_id}/cancel", operation_id="outline-jobs-cancel", responses=documented(404))
-def cancel(sid: str, job_id: str, services: ServicesDep) -> OutlineJobAnswer:
+def cancel(sid: str, job_id: str, services: ServicesDep, key: IdempotencyKey) -> OutlineJobAnswer:
     """Stop an outlining, which leaves nothing then. One that has ended stays as it is."""
     return OutlineJobAnswer.of(services.outlines.cancel(sid, job_id))

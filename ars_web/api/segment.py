@@ -7,7 +7,7 @@ import numpy as np
 from fastapi import APIRouter, Response
 from pydantic import BaseModel, Field
 
-from ars_web.api.dependencies import JsonResponse, ServicesDep, StrictRoute
+from ars_web.api.dependencies import IdempotencyKey, JsonResponse, ServicesDep, StrictRoute
 from ars_web.api.mask_models import PolygonAnswer, rounded_polygons_json
 from ars_web.api.models import Strict
 from ars_web.api.problems import documented
@@ -54,7 +54,7 @@ class SegmentAnswer(BaseModel):
 @router.post(
     "/{index}/segment", operation_id="frames-segment", response_model=SegmentAnswer, responses=documented(404, 413)
 )
-def segment(sid: str, index: int, draft: SegmentDraft, services: ServicesDep) -> Response:
+def segment(sid: str, index: int, draft: SegmentDraft, services: ServicesDep, key: IdempotencyKey) -> Response:
     """Find an object's outline in a frame's photograph. Nothing is stored."""
     taken = photographs(services.store, sid)
     if not 0 <= index < len(taken.frames):
