@@ -23,6 +23,10 @@ NEAR_FAR = 1e-6
 DEPTH_MARGIN = 0.05
 """Of its depth, by which a cone is longer than what it must reach."""
 
+FEW = 2
+"""Outlines that touch no border. With fewer, a hull has pieces where no camera looks; with as many, a piece that an
+open outline shows nothing of may be a part of the object that is beyond that image."""
+
 WIDEST_WINDOW = 1e3
 """In the normalised plane: 89.9 degrees off the axis."""
 
@@ -107,7 +111,8 @@ def intersection(scene: ConeScene) -> Solid | None:
         hull = hull.trim_by_plane((0.0, 0.0, 1.0), scene.ground - middle[2])
     for solid in taken:
         hull = hull - solid
-    hull = _seen(hull, [cone for cone in scene.cones if cone.is_open], scene, middle)
+    if len(closed) < FEW:
+        hull = _seen(hull, scene.cones, scene, middle)
     if hull.is_empty() or not hull.volume() > 0:
         return None
     mesh = hull.to_mesh64()
@@ -135,12 +140,10 @@ def _beside(
     return rings_of(shapely.box(*(low - more), *(high + more)).difference(cone.background)) or None
 
 
-def _seen(hull: Manifold, opened: Sequence[ViewingCone], scene: ConeScene, origin: Float[np.ndarray, "3"]) -> Manifold:
-    """A hull without the pieces that some open cone's mask shows nothing of: an object is one thing, and is seen."""
-    if not opened or hull.is_empty():
-        return hull
-    pieces = hull.decompose()
-    for cone in opened:
+def _seen(hull: Manifold, cones: Sequence[ViewingCone], scene: ConeScene, origin: Float[np.ndarray, "3"]) -> Manifold:
+    """A hull without the pieces that some open cone's mask shows nothing of."""
+    pieces = [] if hull.is_empty() else hull.decompose()
+    for cone in (cone for cone in cones if cone.is_open):
         pieces = [piece for piece in pieces if _shows(cone, piece, scene, origin)]
     return Manifold.batch_boolean(pieces, OpType.Add) if pieces else Manifold()
 

@@ -149,6 +149,21 @@ def touches_half(view: View) -> bool:
     return points[:, 0].min() <= 0 and np.ptp(points[:, 0]) < 0.7 * np.ptp(points[:, 1])
 
 
+def test_a_piece_beyond_the_border_of_one_image_is_kept_where_others_show_it(hulls):
+    camera = hulls.CAMERAS["pinhole"]
+    balls = [trimesh.creation.icosphere(3, 0.02).apply_translation([0, y, 0]) for y in (-0.06, 0.06)]
+    both = trimesh.util.concatenate(balls)
+    views = hulls.views_of(both, camera, [hulls.looking((0.45, 0.1, 0.2)), hulls.looking((0.1, 0.3, 0.4))])
+    # So near and turned that one ball is cut by the border, and the other beyond it.
+    angles = np.linspace(0.3, 1.0, 60)
+    near = View(2, camera, hulls.looking((-0.3, 0.0, 0.1)), views[0].polygons)
+    turns = (hulls.view_of(2, camera, turned(near, angle), both) for angle in angles)
+    cut = next(view for view in turns if len(view.polygons) == 1 and touches_half(view))
+    hull = visual_hull([*views, cut])
+    assert hulls.inside(hull, np.array([[0, -0.06, 0], [0, 0.06, 0]])).all()
+    assert hulls.wrong(hull, [*views, cut]) == 0
+
+
 def test_an_open_mask_and_one_other_leave_a_hull_that_ends(hulls):
     mesh, camera = hulls.shape("sphere"), hulls.CAMERAS["pinhole"]
     first, second = hulls.views_of(mesh, camera, hulls.round_about(2, distance=0.3))
@@ -392,6 +407,7 @@ def check_random_hull(hull: VisualHull, views: list[View], around: np.ndarray, l
     clear = asked.margin > 1.0
     within = hulls.inside(hull, around)
     assert not (within & ~asked.possible)[clear].any()
-    closed = all(0 < p.outer.min() and (p.outer < [639, 479]).all() for v in views for p in v.polygons)
-    if closed:
+    # With fewer whole outlines, where the hull ends is a guess.
+    whole = [all((p.outer > 1).all() and (p.outer < [639, 479]).all() for p in view.polygons) for view in views]
+    if sum(whole) >= 2 or all(whole):
         np.testing.assert_array_equal(within[clear], asked.possible[clear])
