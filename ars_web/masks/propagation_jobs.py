@@ -293,8 +293,9 @@ class OutlineJobs:
         if begun.box is not None and not begun.follows:
             stored = begun.box.hull
             return begun.box.box, None if stored is None else self._store.hull(order.sid, stored)
-        outlines = [(mask.frame, mask.polygons) for mask in (*begun.accepted, *accepted)]
-        return object_of(views_of(photographs(self._store, order.sid), outlines), begun.options)
+        outlines = {mask.frame: mask.polygons for mask in (*begun.accepted, *accepted)}
+        views = views_of(photographs(self._store, order.sid), sorted(outlines.items()))
+        return object_of(views, begun.options)
 
     def _change(self, job_id: str, *, settled: bool = False, **changes: Any) -> None:
         """Change a job, or raise Cancelled where it is not to go on."""
