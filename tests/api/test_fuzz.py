@@ -30,6 +30,16 @@ def shaped(**fields: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
 
 vectors = st.lists(numbers, min_size=3, max_size=3)
 transforms = shaped(position=vectors, wxyz=st.lists(numbers, min_size=4, max_size=4))
+corners = st.lists(st.lists(st.floats(-50, 250), min_size=2, max_size=2), min_size=3, max_size=6)
+outlines = st.lists(
+    shaped(outer=st.one_of(corners, corners, anything), holes=st.lists(corners, max_size=1)), max_size=2
+)
+views = st.lists(shaped(frame=st.integers(0, 6), polygons=outlines, mask_png=texts), max_size=3)
+hulls = {
+    "orientation": st.sampled_from(["world", "upright", "free"]),
+    "widen_px": numbers,
+    "ground": st.one_of(st.none(), numbers),
+}
 BODIES: dict[str, st.SearchStrategy[Any]] = {
     "POST /boxes": shaped(class_id=numbers, T_world_box=transforms, size=vectors, name=texts),
     "PATCH /boxes/1": shaped(class_id=numbers, T_world_box=transforms, size=vectors, name=texts),
@@ -41,6 +51,27 @@ BODIES: dict[str, st.SearchStrategy[Any]] = {
     ),
     "POST /labels": shaped(boxes=st.lists(shaped(T_world_box=transforms, size=vectors)), frames=st.lists(numbers)),
     "POST /points": shaped(observations=st.lists(shaped(frame=numbers, x=numbers, y=numbers), max_size=4)),
+    "POST /boxes/from-masks": shaped(class_id=numbers, views=views, box_id=numbers, name=texts, **hulls),
+    "PUT /boxes/1/hull": shaped(position=texts, class_id=numbers, **hulls),
+    "POST /boxes/1/refine": shaped(views=views, dry_run=st.booleans()),
+    "POST /boxes/1/outline-rest": shaped(frames_most=numbers),
+    "POST /masks": shaped(
+        box_id=st.one_of(st.none(), numbers), class_id=st.just(0), frame=st.integers(0, 6), polygons=outlines
+    ),
+    "PUT /masks/1": shaped(polygons=outlines, accepted=st.booleans(), origin=texts),
+    "POST /hull-preview": shaped(views=views, show_in=st.lists(st.integers(0, 6), max_size=3), **hulls),
+    "POST /polygons/combine": shaped(
+        polygons=outlines,
+        operation=st.sampled_from(["add", "subtract"]),
+        stroke=st.one_of(st.none(), shaped(points=corners, width=numbers)),
+        polygon=st.one_of(st.none(), shaped(outer=corners)),
+        frame=st.integers(0, 6),
+    ),
+    "POST /frames/0/segment": shaped(
+        rectangle=st.lists(st.floats(0, 160), min_size=4, max_size=4),
+        inside=st.lists(corners, max_size=2),
+        start=outlines,
+    ),
     "POST /classes": shaped(name=texts, color=texts),
     "PATCH /classes/0": shaped(name=texts, color=texts),
     "PATCH ": shaped(name=texts),
@@ -53,21 +84,21 @@ BODIES: dict[str, st.SearchStrategy[Any]] = {
 requests = st.sampled_from(sorted(BODIES)).flatmap(lambda name: st.tuples(st.just(name), BODIES[name]))
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=250, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(request=requests, tag=st.sampled_from(["current", '"0"', '"x"', "nonsense", ""]))
 def test_no_request_makes_the_server_fail(server, sid: str, request: tuple[str, Any], tag: str) -> None:
     name, body = request
     method, _, part = name.partition(" ")
     path = f"/api/sessions/{sid}{part}"
     headers = {"Content-Type": "application/json"}
-    if method == "PATCH":
-        current = server.client.get(path).headers.get("etag", '"0"')
+    if method in ("PATCH", "PUT"):
+        current = server.client.get(path.removesuffix("/hull")).headers.get("etag", '"0"')
         headers["If-Match"] = current if tag == "current" else tag
     content = json.dumps(body).encode(errors="surrogatepass")
     answer = server.client.request(method, path, content=content, headers=headers)
     assert answer.status_code < 500, answer.text
     assert answer.status_code < 400 or answer.json()["detail"]
-    for read in ("", "/boxes", "/classes"):
+    for read in ("", "/boxes", "/classes", "/masks"):
         assert server.client.get(f"/api/sessions/{sid}{read}").status_code == 200
     labels = server.client.get(f"/api/sessions/{sid}/frames/0/labels")
     assert labels.status_code == 200, labels.text
