@@ -6,6 +6,7 @@ import { fixed, millimetres, trimmed } from "../lib/quantity.js";
 import { anglesOfWxyz, wxyzOfAngles } from "../lib/rotation.js";
 import { html, useRef } from "../lib/view.js";
 import * as store from "../store.js";
+import { Fit, FitButton } from "./masks/fit.js";
 import { SnapButton } from "./snap_button.js";
 
 /** @typedef {import("../store.js").Box} Box */
@@ -151,6 +152,7 @@ function ClassOfBox({ box }) {
 
 /** @param {{box: Box}} props */
 function Buttons({ box }) {
+  const stored = store.boxes.value.get(box.id) ?? null;
   /** @param {"box" | "world"} axes */
   const axesButton = (axes) => html`<button
     class="button small" aria-pressed=${store.axes.value === axes} onClick=${() => (store.axes.value = axes)}
@@ -172,7 +174,8 @@ function Buttons({ box }) {
     <div class="box-buttons">
       ${button("ground", "To ground")}${button("duplicate", "Duplicate")}
       ${button("lock", box.locked ? "Unlock" : "Lock")}${button("delete", "Delete")}
-    </div>`;
+    </div>
+    ${store.masksOfSelected.value.length > 0 && html`<div class="box-buttons"><${FitButton} box=${stored} /></div><${Fit} box=${stored} />`}`;
 }
 
 /** Out of the fields, to where the arrows nudge the box: in the list of boxes they would choose another. */

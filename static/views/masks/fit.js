@@ -29,8 +29,14 @@ function dismiss(id) {
   fits.value = next;
 }
 
-/** @param {{subject: import("./subject.js").Subject}} props */
-export function FitButton({ subject: { box } }) {
+/** @param {number} frame */
+function show(frame) {
+  if (store.mode.value === "masks") openView(frame);
+  else store.actions.enterFrame(frame);
+}
+
+/** @param {{box: import("../../store.js").Box | null}} props */
+export function FitButton({ box }) {
   if (box === null) return null;
   const count = store.masksOfSelected.value.filter((mask) => mask.accepted).length;
   const orientation = options.value.orientation === "free" ? "free" : "upright";
@@ -40,8 +46,8 @@ export function FitButton({ subject: { box } }) {
   >Fit to masks</button>`;
 }
 
-/** @param {{subject: import("./subject.js").Subject}} props */
-export function Fit({ subject: { box } }) {
+/** @param {{box: import("../../store.js").Box | null}} props */
+export function Fit({ box }) {
   const told = box === null ? undefined : fits.value.get(box.id);
   if (box === null || told === undefined) return null;
   const away = html`<button class="button link" onClick=${() => dismiss(box.id)}>Dismiss</button>`;
@@ -55,7 +61,7 @@ export function Fit({ subject: { box } }) {
     <ul class="residuals">
       ${told.residuals.map(
         ({ frame, rms_px, outlier }) => html`<li key=${frame}>
-          <button class="button link" onClick=${() => openView(frame)}>Frame ${frame}</button>
+          <button class="button link" onClick=${() => show(frame)}>Frame ${frame}</button>
           <span class=${outlier ? "narrow" : "muted"}>${rms_px.toFixed(1)} px${outlier ? ", stands out" : ""}</span>
         </li>`,
       )}

@@ -40,11 +40,11 @@ export function Views({ subject }) {
         class="button small" aria-pressed=${hasPlane || planeOpen.value} aria-expanded=${planeOpen.value} onClick=${() => (planeOpen.value = !planeOpen.value)}
         title="The plane that the object stands on: nothing of it is below. Cameras that look from above only need it."
       >${hasPlane ? `Plane at ${millimetres(options.value.ground ?? 0)} mm` : "Support plane"}</button>
-      <${FitButton} subject=${subject} />
+      <${FitButton} box=${subject.box} />
     </div>
     ${planeOpen.value && html`<${SupportPlane} subject=${subject} onDone=${() => (planeOpen.value = false)} />`}
     <${OutlineRest} job=${jobs.value.get(subject.id ?? store.NEW)} id=${subject.id} />
-    <${Fit} subject=${subject} />
+    <${Fit} box=${subject.box} />
   </section>`;
 }
 

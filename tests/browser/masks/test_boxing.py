@@ -4,6 +4,7 @@ import re
 from typing import Any
 
 import numpy as np
+import pytest
 from playwright.sync_api import Locator, Page, expect
 
 from ars_web.demo.truth import DemoTruth
@@ -105,6 +106,9 @@ def test_two_outlines_make_a_box(demo_recording: DemoTruth, boxed_session, open_
         draw(page, FRAMES[0], outline(alone(FRAMES[0], BALL)), truth)
         saved(page, 1)
         expect(page.get_by_role("row", name="ball new")).to_be_visible()
+        another = page.context.new_page()
+        another.goto(page.url)
+        expect(another.get_by_role("row", name="ball Selected by someone new")).to_be_visible()
         expect(page.get_by_text("the object lies inside the dashed band")).to_be_visible()
         expect(make).to_have_attribute("aria-disabled", "true")
         draw(page, FRAMES[1], outline(alone(FRAMES[1], BALL)), truth)
@@ -122,6 +126,8 @@ def test_two_outlines_make_a_box(demo_recording: DemoTruth, boxed_session, open_
         assert apart < 0.25 * true.size.max()
         assert (np.array(made["size"]) > 0.9 * true.size).all()
         expect(page.get_by_role("row", name=made["name"])).to_have_attribute("aria-selected", "true")
+        expect(another.get_by_role("row", name=f"{made['name']} Selected by someone")).to_be_visible()
+        expect(another.get_by_role("row", name="ball Selected by someone new")).to_have_count(0)
 
 
 def test_a_box_follows_its_masks_and_undo_takes_both_back(
@@ -210,3 +216,87 @@ def test_the_smart_tool_finds_an_object_from_a_rough_rectangle(
         assert found["origin"] == "smart"
         polygons = [Polygon(np.array(one["outer"]), tuple(map(np.array, one["holes"]))) for one in found["polygons"]]
         assert iou(polygons, polygons_from_mask(mask)) >= 0.85
+
+
+def test_how_a_hull_is_made_is_stored_at_once_and_the_box_follows(
+    demo_recording: DemoTruth, boxed_session, open_flatly, alone: Alone
+) -> None:
+    with open_flatly(*boxed_session, **LARGE) as workspace:
+        page = workspace.page
+        made = by_hand(workspace, alone)
+        box = f"/boxes/{made['id']}"
+        page.get_by_role("row", name="drawn ball").click()
+        page.get_by_role("tab", name="Masks").click()
+        page.get_by_role("group", name="Box axes").get_by_role("button", name="Free").click()
+        saved(page, 2)
+        assert workspace.answer(box)["hull_options"]["orientation"] == "free"
+        error = page.get_by_label("Expected mask error")
+        error.fill("many")
+        error.press("Enter")
+        expect(page.get_by_role("region", name="How the box is made").get_by_role("alert")).to_contain_text(
+            "such as 1.5"
+        )
+        error.fill("2,5 px")
+        error.press("Enter")
+        saved(page, 3)
+        assert workspace.answer(box)["hull_options"]["widen_px"] == 2.5
+        assert workspace.answer(f"{box}/hull")["volume"] > made["hull"]["volume"]
+        page.get_by_role("button", name="Support plane").click()
+        plane = page.get_by_role("group", name="Support plane")
+        plane.get_by_label("Stands at z").fill("1 cm")
+        plane.get_by_label("Stands at z").press("Enter")
+        saved(page, 4)
+        assert workspace.answer(box)["hull_options"]["ground"] == pytest.approx(0.01)
+        hull = workspace.answer(f"{box}/hull")
+        assert min(z for _, _, z in hull["vertices"]) > 0.01 - 1e-6
+        plane.get_by_role("button", name="No plane").click()
+        saved(page, 5)
+        assert workspace.answer(box)["hull_options"]["ground"] is None
+
+
+def test_a_box_that_was_placed_by_hand_is_fitted_to_its_masks(
+    demo_recording: DemoTruth, boxed_session, open_flatly, alone: Alone
+) -> None:
+    truth = demo_recording
+    tea = 0
+    with open_flatly(*boxed_session, **LARGE) as workspace:
+        page, client = workspace.page, workspace.client
+        box = workspace.answer("/boxes")[tea]
+        address = f"/api/sessions/{workspace.sid}"
+        x, y, z = box["T_world_box"]["position"]
+        rough = {"T_world_box": {**box["T_world_box"], "position": [x + 0.02, y - 0.015, z]}}
+        assert client.patch(f"{address}/boxes/{box['id']}", json=rough, headers={"If-Match": '"0"'}).status_code == 200
+        for frame in (0, 2, 4, 5):
+            polygons = [{"outer": outline(alone(frame, tea), tolerance=0.5).tolist(), "holes": []}]
+            mask = {"box_id": box["id"], "class_id": box["class_id"], "frame": frame, "polygons": polygons}
+            assert client.post(f"{address}/masks", json=mask).status_code == 201
+        page.get_by_role("row", name=box["name"]).first.click()
+        page.get_by_role("tab", name="Masks").click()
+        page.get_by_role("button", name="Fit to masks").click()
+        told = page.get_by_role("group", name="How well the box fits its masks")
+        expect(told).to_contain_text(re.compile(r"Moved by \d+\.\d mm"))
+        expect(told.get_by_role("listitem")).to_have_count(4)
+        fitted = box_of(workspace.answer(f"/boxes/{box['id']}"))
+        apart = np.linalg.norm(fitted.T_world_box[:3, 3] - truth.objects[tea].box.T_world_box[:3, 3])
+        assert apart < 0.004
+
+
+def test_the_machine_outlines_the_rest_in_one_step(
+    demo_recording: DemoTruth, boxed_session, open_flatly, alone: Alone
+) -> None:
+    with open_flatly(*boxed_session, **LARGE) as workspace:
+        page = workspace.page
+        made = by_hand(workspace, alone)
+        page.get_by_role("row", name="drawn ball").click()
+        page.get_by_role("tab", name="Masks").click()
+        page.get_by_role("button", name="Outline the rest").click()
+        expect(page.get_by_text(re.compile(r"\d+ masks? added")).first).to_be_visible()
+        saved(page, 2)
+        masks = workspace.answer("/masks")
+        added = [mask for mask in masks if mask["origin"] == "proposed"]
+        assert added
+        rows = page.get_by_role("region", name="Masks of drawn ball").get_by_role("listitem")
+        expect(rows).to_have_count(len(masks))
+        narrower = workspace.answer(f"/boxes/{made['id']}")
+        true = demo_recording.objects[BALL].box.size
+        assert np.abs(np.array(narrower["size"]) - true).max() < np.abs(np.array(made["size"]) - true).max()
