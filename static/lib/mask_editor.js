@@ -299,6 +299,7 @@ export class MaskEditor {
         const result = base.length === 0 && "polygon" in shape ? [shape.polygon] : await this.#host.combine(base, shape, operation === "subtract" ? "subtract" : "add");
         // Another step may have come meanwhile, of somebody else's or by undo: then on top of that.
         if (operation !== "new" && sheet.settled !== base) continue;
+        this.#host.onFailure(null);
         sheet.set(result, step);
         return true;
       } catch (error) {

@@ -25,7 +25,7 @@ import { paneFromImage } from "./image_view.js";
  * @property {string} color
  * @property {string} [label]
  * @property {boolean} [active] what the arrow keys move
- * @property {"ring" | "handle" | "ghost"} [shape] a ring, which leaves seen what is under it; a white disc, or a faint one
+ * @property {"ring" | "handle" | "target" | "ghost"} [shape] a ring, which leaves seen what is under it; a disc: white, coloured, or faint
  * @property {number} [reach] how near a press means it, CSS pixels
  */
 
@@ -168,21 +168,22 @@ export function paintBrush(context, at, { diameter, color }, view, paint) {
 }
 
 /**
- * A white disc with a coloured edge; what is active, the other way round.
+ * A white disc with a coloured edge; what is active, or a target, the other way round.
  * @param {CanvasRenderingContext2D} context @param {Point} point @param {View} view @param {(color: string) => string} paint
  */
 function paintHandle(context, point, view, paint) {
   const { x, y } = paneFromImage(view, point);
   const color = paint(point.color);
+  const isFull = point.active === true || point.shape === "target";
   context.globalAlpha = point.shape === "ghost" ? 0.7 : 1;
   context.beginPath();
-  context.arc(x, y, point.active ? HANDLE + 1.5 : HANDLE, 0, 2 * Math.PI);
+  context.arc(x, y, isFull ? HANDLE + 1.5 : HANDLE, 0, 2 * Math.PI);
   context.strokeStyle = FAINT_HALO;
   context.lineWidth = 4;
   context.stroke();
-  context.fillStyle = point.active ? color : "#fff";
+  context.fillStyle = isFull ? color : "#fff";
   context.fill();
-  context.strokeStyle = point.active ? "#fff" : color;
+  context.strokeStyle = isFull ? "#fff" : color;
   context.lineWidth = 2;
   context.stroke();
   context.globalAlpha = 1;

@@ -37,7 +37,8 @@ export class OpenRing {
   /** @param {Place | null} at @param {"pointer" | "finger" | "keys"} by */
   hover(at, by) {
     this.#pointer = at;
-    this.#aimed = by === "keys" && at !== null;
+    // A pointer that only passes by changes nothing of where Enter goes.
+    this.#aimed ||= by === "keys" && at !== null;
     this.#board.repaint();
   }
 
@@ -124,7 +125,10 @@ export class OpenRing {
         ...(ring.length > 1 ? [{ points: ring, color, width: 2 }] : []),
         ...(ahead.length > 0 ? [{ points: ahead, color, width: 1.5, dash: [4, 4] }] : []),
       ],
-      points: ring.map(([x, y], i) => ({ id: `${ID}${i}`, x, y, color, shape: "handle", active: i === 0 && ring.length >= LEAST, reach: i === 0 ? REACH_FIRST : REACH })),
+      points: ring.map(([x, y], i) => {
+        const closes = i === 0 && ring.length >= LEAST;
+        return { id: `${ID}${i}`, x, y, color, shape: closes ? "target" : "handle", reach: closes ? REACH_FIRST : REACH };
+      }),
     };
   }
 }
