@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float
 
 from ars_web.errors import BadInput
 from ars_web.geometry import rigid_transform
-from ars_web.geometry.box import Box
+from ars_web.geometry.box import CORNER_SIGNS, Box, stack
 from ars_web.geometry.box_parameters import PARAMETERS, STEP, BoxParameters, Orientation, upright_box, with_nearest_axes
 from ars_web.geometry.box_sighting import SightedBoxes, Sighting
 from ars_web.geometry.triangulation import Observation, triangulate
@@ -36,11 +36,19 @@ MOST_STARTS = 6
 ENOUGH_STARTS = 3
 """Where there are rows in plenty."""
 
+MANY_STARTS = 12
+
+FEW = 2
+"""Rows for each number of a box's; where there are fewer, many starts are tried."""
+
+SETTLED = 1.5
+"""Pixels, in the root mean square, to which outlines are drawn; a fit as good as that needs no other start."""
+
 PLENTY = 4
 """Rows for each parameter; where there are fewer, quite different boxes may fit."""
 
-SAME_COST = 9.0
-"""Squared pixels by which a box may fit worse and still be the true one: three standard deviations."""
+SAME_COST = 16.0
+"""Squared pixels by which a box may fit worse and still be the true one: four standard deviations."""
 
 LARGEST_ERROR = 0.12
 """Of the box's diagonal: how far off its worst corner may be, one standard deviation, if sides are seen to a pixel."""
@@ -95,11 +103,11 @@ def fit_box(start: Box, sightings: Sequence[Sighting], *, orientation: Orientati
     fit = None
     if seen.has_outlines:
         fit = _best(starts, seen, orientation=orientation, by_outline=True)
-        if _spread(seen.misfits([fit.box], by_outline=True)) > _good(seen):
+        if _spread(seen.misfits(*stack([fit.box]), by_outline=True)) > _good(seen):
             starts, fit = [fit.box, *starts], None
     if fit is None:
         fit = _best(starts, seen, orientation=orientation, by_outline=False)
-    off = seen.off([fit.box])[0]
+    off = seen.off(*stack([fit.box]))[0]
     rms = math.sqrt(float(np.mean(off**2)))
     _check_fit(fit, sightings, seen, off, orientation=orientation)
     doubts = _doubts(off)
@@ -137,15 +145,16 @@ def _starts(first: Box, sightings: Sequence[Sighting], seen: SightedBoxes, *, or
         turns += [sign * tilt * axis for axis in np.eye(3)[:2] for sign in (-1.0, 1.0)]
     first_turned = [parameters.turned(turn) for turn in turns]
     candidates = list(first_turned)
+    first_turned += [Box(box.T_world_box, np.full(3, np.cbrt(np.prod(box.size)))) for box in first_turned]
     centre = _seen_centre(sightings)
     if centre is not None:
         moved = [_at(box, centre, scale=1.0) for box in first_turned]
-        labels = seen.labelled(moved)
+        labels = seen.labelled(*stack(moved))
         ratio = seen.sizes / np.sqrt(np.prod(labels[..., 2:] - labels[..., :2], axis=-1))
         for box, scale in zip(moved, np.nanmedian(ratio, axis=1), strict=True):
             if np.isfinite(scale) and 0.01 < scale < 100:
                 candidates.append(_at(box, centre, scale=float(scale)))
-    costs = np.median(np.abs(seen.misfits(candidates, by_outline=False)), axis=1)
+    costs = np.median(np.abs(seen.misfits(*stack(candidates), by_outline=False)), axis=1)
     return [candidates[i] for i in np.argsort(costs, kind="stable")]
 
 
@@ -174,19 +183,20 @@ def _best(starts: Sequence[Box], seen: SightedBoxes, *, orientation: Orientation
     Raises:
         BadInput: two boxes that differ fit as well.
     """
-    rows = seen.misfits(starts[:1], by_outline=by_outline).size
+    rows = seen.misfits(*stack([starts[0]]), by_outline=by_outline).size
     plenty = rows >= PLENTY * PARAMETERS[orientation]
+    few = rows < FEW * PARAMETERS[orientation]
     found: list[_Solution] = []
-    for start in starts[:MOST_STARTS]:
+    for start in starts[: MANY_STARTS if few else MOST_STARTS]:
         found.append(_solve(start, seen, orientation=orientation, by_outline=by_outline))
-        misfits = seen.misfits([found[-1].box], by_outline=by_outline)
-        if plenty and (_spread(misfits) <= _good(seen) or len(found) == ENOUGH_STARTS):
+        off = seen.misfits(*stack([found[-1].box]), by_outline=by_outline)
+        if plenty and (math.sqrt(float(np.mean(off**2))) <= SETTLED * PIXEL or len(found) == ENOUGH_STARTS):
             break
     best = min(found, key=lambda solution: solution.cost)
     if not plenty:
         _check_one(best, found, seen)
     # Where an object is no box the misfits are large for all frames; none of them is an outlier for that.
-    spread = 1.5 * _spread(seen.misfits([best.box], by_outline=by_outline))
+    spread = 1.5 * _spread(seen.misfits(*stack([best.box]), by_outline=by_outline))
     if spread > _good(seen):
         return _solve(best.box, seen, orientation=orientation, by_outline=by_outline, scale=spread)
     return best
@@ -234,11 +244,11 @@ def _solve(
     parameters = BoxParameters(start, orientation)
 
     def misfits(x: Float[np.ndarray, "p"]) -> Float[np.ndarray, "m"]:
-        return seen.misfits([parameters.box(x)], by_outline=by_outline)[0]
+        return seen.misfits(*parameters.placed(x[None]), by_outline=by_outline)[0]
 
     def slopes(x: Float[np.ndarray, "p"]) -> Float[np.ndarray, "m p"]:
-        here, *moved = seen.misfits(parameters.around(x), by_outline=by_outline)
-        return (np.array(moved) - here).T / STEP
+        rows = seen.misfits(*parameters.around(x), by_outline=by_outline)
+        return (rows[1:] - rows[0]).T / STEP
 
     scale = 2 * _good(seen) if scale is None else scale
     found = least_squares(
@@ -247,8 +257,8 @@ def _solve(
         jac=slopes,  # pyright: ignore[reportArgumentType]: the stubs know no callable here
         loss="huber",
         f_scale=scale,
-        xtol=1e-5,
-        ftol=1e-5,
+        xtol=1e-4,
+        ftol=1e-4,
         max_nfev=MOST_STEPS,
     )
     x = np.asarray(found.x, dtype=np.float64)
@@ -266,8 +276,9 @@ def _corner_error(
 ) -> float:
     """Metres, one standard deviation of the worst corner if every row was seen to a pixel; infinity where the rows
     leave something open. To first order: the parameters' covariance is (J^T W J)^-1, a corner's is D of it D^T."""
-    here, *moved = (box.corners_world for box in parameters.around(x))
-    moves = (np.array(moved) - here) / STEP
+    Ts_world_box, sizes = parameters.around(x)
+    corners = rigid_transform.transform_points(Ts_world_box, CORNER_SIGNS * sizes[:, None] / 2)
+    moves = (corners[1:] - corners[0]) / STEP
     values, vectors = np.linalg.eigh((slopes.T * weights) @ slopes)
     if not values[0] > SMALLEST_EIGENVALUE * values[-1]:
         return math.inf

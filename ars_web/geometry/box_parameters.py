@@ -37,14 +37,26 @@ class BoxParameters:
         """How many numbers there are."""
         return PARAMETERS[self.orientation]
 
+    def placed(self, xs: Float[np.ndarray, "k p"]) -> tuple[Float[np.ndarray, "k 4 4"], Float[np.ndarray, "k 3"]]:
+        """`Ts_world_box` (k, 4, 4) and `sizes` (k, 3) of k rows of numbers."""
+        T = self.start.T_world_box
+        places = T[:3, 3] + xs[:, :3] * (float(np.linalg.norm(self.start.size)) / 2)
+        turns = np.zeros((len(xs), 3))
+        turns[:, 2 if self.orientation == "upright" else slice(3)] = (
+            xs[:, 3] if self.orientation == "upright" else xs[:, 3:6]
+        )
+        half = np.linalg.norm(turns, axis=1, keepdims=True) / 2
+        # sin(half) / half, which np.sinc knows at 0, too
+        wxyz = np.concatenate([np.cos(half), turns / 2 * np.sinc(half / math.pi)], axis=1)
+        R = rigid_transform.rotation_from_wxyz(wxyz)
+        R = R @ T[:3, :3] if self.orientation == "upright" else T[:3, :3] @ R
+        sizes = self.start.size * np.exp(np.clip(xs[:, -3:], -LARGEST_CHANGE, LARGEST_CHANGE))
+        return rigid_transform.from_rotation(R, places), sizes
+
     def box(self, x: Float[np.ndarray, "p"]) -> Box:
         """The box of the numbers."""
-        T = self.start.T_world_box
-        place = T[:3, 3] + x[:3] * float(np.linalg.norm(self.start.size)) / 2
-        R = T[:3, :3]
-        R = rigid_transform.rotation_about_z(float(x[3])) @ R if self.orientation == "upright" else R @ _turn(x[3:6])
-        size = self.start.size * np.exp(np.clip(x[-3:], -LARGEST_CHANGE, LARGEST_CHANGE))
-        return Box(rigid_transform.from_rotation(R, place), size)
+        Ts_world_box, sizes = self.placed(x[None])
+        return Box(Ts_world_box[0], sizes[0])
 
     def turned(self, angles: Float[np.ndarray, "3"]) -> Box:
         """The start turned by a rotation vector along its axes; upright: about the vertical by its last number."""
@@ -52,17 +64,9 @@ class BoxParameters:
         x[3 : self.count - 3] = angles[2:] if self.orientation == "upright" else angles
         return self.box(x)
 
-    def around(self, x: Float[np.ndarray, "p"]) -> list[Box]:
-        """The box itself, then a step along each number."""
-        return [self.box(x), *(self.box(x + step) for step in STEP * np.eye(self.count))]
-
-
-def _turn(rotation_vector: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
-    half = float(np.linalg.norm(rotation_vector)) / 2
-    # sin(half) / half, which np.sinc knows at 0, too
-    return rigid_transform.rotation_from_wxyz(
-        np.array([math.cos(half), *(rotation_vector / 2 * np.sinc(half / math.pi))])
-    )
+    def around(self, x: Float[np.ndarray, "p"]) -> tuple[Float[np.ndarray, "p+1 4 4"], Float[np.ndarray, "p+1 3"]]:
+        """The box itself, then a step along each number, as `placed` gives them."""
+        return self.placed(x + np.concatenate([np.zeros((1, self.count)), STEP * np.eye(self.count)]))
 
 
 def upright_box(box: Box) -> Box:

@@ -8,9 +8,8 @@ import shapely
 from jaxtyping import Bool, Float
 
 from ars_web.errors import BadInput
-from ars_web.geometry.box import Box
 from ars_web.geometry.camera import Camera
-from ars_web.geometry.labels import labels_of_boxes, outlines
+from ars_web.geometry.labels import labels_of_stacked, outlines_of_stacked
 from ars_web.geometry.rigid_transform import Transform
 
 AT_BORDER = 1.5
@@ -129,43 +128,54 @@ class SightedBoxes:
         """Of what was seen, pixels: the root of each box's area."""
         return np.sqrt(np.prod(self._seen[:, 2:] - self._seen[:, :2], axis=1))
 
-    def labelled(self, boxes: Sequence[Box]) -> Float[np.ndarray, "b n 4"]:
-        """The boxes' labels as the sightings were made, of the part in the image or of the whole; where no part of a
+    def labelled(
+        self, Ts_world_box: Float[np.ndarray, "b 4 4"], sizes: Float[np.ndarray, "b 3"]
+    ) -> Float[np.ndarray, "b n 4"]:
+        """The labels of boxes as the sightings were made, of the part in the image or of the whole; where no part of a
         box is in the image, of the whole; NaN where it is behind the camera."""
-        found = np.empty((len(boxes), len(self._sightings), 4))
+        found = np.empty((len(sizes), len(self._sightings), 4))
         for camera, rows in self._rows.items():
-            labels = labels_of_boxes(camera, self._Ts_world_camera[rows], boxes, tolerance=TOLERANCE)
+            Ts = self._Ts_world_camera[rows]
+            labels = labels_of_stacked(camera, Ts, Ts_world_box, sizes, tolerance=TOLERANCE)
             whole = self._is_amodal[rows, None, None] | np.isnan(labels.bbox)
             found[:, rows] = np.where(whole, labels.bbox_amodal, labels.bbox).swapaxes(0, 1)
         return found
 
-    def off(self, boxes: Sequence[Box]) -> Float[np.ndarray, "b n 4"]:
+    def off(
+        self, Ts_world_box: Float[np.ndarray, "b 4 4"], sizes: Float[np.ndarray, "b 3"]
+    ) -> Float[np.ndarray, "b n 4"]:
         """How far each side of a label lies to the right of, or below, where it was seen, pixels. A side that the
         image's border cuts is off only where the label does not reach it. NaN where there is no label."""
-        off = self.labelled(boxes) - self._seen
+        off = self.labelled(Ts_world_box, sizes) - self._seen
         short = np.concatenate([np.maximum(off[..., :2], 0.0), np.minimum(off[..., 2:], 0.0)], axis=-1)
         return np.where(self._cut, short, off)
 
-    def off_between(self, boxes: Sequence[Box]) -> Float[np.ndarray, "b n 12"]:
+    def off_between(
+        self, Ts_world_box: Float[np.ndarray, "b 4 4"], sizes: Float[np.ndarray, "b 3"]
+    ) -> Float[np.ndarray, "b n 12"]:
         """How far boxes reach further than the outlines in the directions BETWEEN, pixels; 0 where nothing is known,
         NaN where no part of the box is in the image."""
-        found = np.zeros((len(boxes), len(self._sightings), len(BETWEEN)))
+        b = len(sizes)
+        found = np.zeros((b, len(self._sightings), len(BETWEEN)))
         known = np.isfinite(self._seen_between)
         for camera, all_rows in self._rows.items():
             rows = all_rows[known[all_rows].any(axis=1)]
-            wanted = np.ones((len(rows), len(boxes)), dtype=bool)
-            points, offsets = outlines(camera, self._Ts_world_camera[rows], boxes, wanted, tolerance=TOLERANCE)
-            reach = _furthest_of_rings(points, offsets).reshape(len(rows), len(boxes), -1).swapaxes(0, 1)
+            wanted = np.ones((len(rows), b), dtype=bool)
+            Ts = self._Ts_world_camera[rows]
+            points, offsets = outlines_of_stacked(camera, Ts, Ts_world_box, sizes, wanted, tolerance=TOLERANCE)
+            reach = _furthest_of_rings(points, offsets).reshape(len(rows), b, -1).swapaxes(0, 1)
             found[:, rows] = np.where(known[rows], reach - self._seen_between[rows], 0.0)
         return found
 
-    def misfits(self, boxes: Sequence[Box], *, by_outline: bool) -> Float[np.ndarray, "b m"]:
+    def misfits(
+        self, Ts_world_box: Float[np.ndarray, "b 4 4"], sizes: Float[np.ndarray, "b 3"], *, by_outline: bool
+    ) -> Float[np.ndarray, "b m"]:
         """All that is off for each box, in a row; finite also where a box is not to be seen, and then large."""
-        rows = [self.off(boxes)]
+        rows = [self.off(Ts_world_box, sizes)]
         if by_outline:
-            rows.append(self.off_between(boxes))
+            rows.append(self.off_between(Ts_world_box, sizes))
         rows = [np.where(np.isfinite(row), row, self._lost[:, None]) for row in rows]
-        return np.concatenate([row.reshape(len(boxes), -1) for row in rows], axis=1)
+        return np.concatenate([row.reshape(len(sizes), -1) for row in rows], axis=1)
 
 
 def _furthest_inside(sighting: Sighting, outline: Float[np.ndarray, "k 2"]) -> Float[np.ndarray, "12"]:

@@ -57,10 +57,21 @@ def labels_of_boxes(
     Raises:
         BadInput: `tolerance` is below FINEST_TOLERANCE.
     """
+    return labels_of_stacked(camera, Ts_world_camera, *stack(list(boxes)), tolerance=tolerance)
+
+
+def labels_of_stacked(
+    camera: Camera,
+    Ts_world_camera: Float[np.ndarray, "n 4 4"],
+    Ts_world_box: Float[np.ndarray, "b 4 4"],
+    sizes: Float[np.ndarray, "b 3"],
+    *,
+    tolerance: float = 0.05,
+) -> BoxLabels:
+    """The same for boxes as `box.stack` gives them; they are not checked."""
     _check_tolerance(tolerance)
-    n, b, tables = len(Ts_world_camera), len(boxes), lens_tables(camera)
+    n, b, tables = len(Ts_world_camera), len(sizes), lens_tables(camera)
     found = BoxLabels(np.empty((n, b, 4)), np.empty((n, b, 4)), np.empty((n, b)))
-    Ts_world_box, sizes = stack(list(boxes))
 
     def label(frames: slice) -> None:
         polygons, corners = _shadows(Ts_world_camera[frames], Ts_world_box, sizes)
@@ -113,9 +124,21 @@ def outlines(
     Raises:
         BadInput: `tolerance` is below FINEST_TOLERANCE.
     """
+    return outlines_of_stacked(camera, Ts_world_camera, *stack(list(boxes)), wanted, tolerance=tolerance)
+
+
+def outlines_of_stacked(
+    camera: Camera,
+    Ts_world_camera: Float[np.ndarray, "n 4 4"],
+    Ts_world_box: Float[np.ndarray, "b 4 4"],
+    sizes: Float[np.ndarray, "b 3"],
+    wanted: Bool[np.ndarray, "n b"],
+    *,
+    tolerance: float = 0.1,
+) -> tuple[Float[np.ndarray, "k 2"], Int[np.ndarray, "n*b+1"]]:
+    """The same for boxes as `box.stack` gives them; they are not checked."""
     _check_tolerance(tolerance)
-    n, b, tables = len(Ts_world_camera), len(boxes), lens_tables(camera)
-    Ts_world_box, sizes = stack(list(boxes))
+    n, b, tables = len(Ts_world_camera), len(sizes), lens_tables(camera)
 
     def rings(frames: slice) -> tuple[np.ndarray, np.ndarray]:
         polygons, corners = _shadows(Ts_world_camera[frames], Ts_world_box, sizes)

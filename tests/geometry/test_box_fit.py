@@ -89,7 +89,6 @@ def corners_off(fit: BoxFit, box: Box) -> float:
 @pytest.mark.parametrize(
     ("orientation", "views", "by_outline", "centre_mm", "corner_mm"),
     [
-        ("upright", 3, False, 1.0, 4.0),
         ("upright", 4, False, 0.6, 2.0),
         ("upright", 8, False, 0.45, 1.2),
         ("upright", 2, True, 1.0, 2.5),
@@ -107,7 +106,7 @@ def test_a_rough_box_comes_near_the_truth(
     record_testsuite_property: Callable[[str, object], None],
 ):
     centres, corners = [], []
-    for seed in range(5):
+    for seed in range(3):
         random = np.random.default_rng(seed)
         Ts, box = round_about(views, random), thing(random, tilted=orientation == "free")
         see = outlines_seen if by_outline else boxes_seen
@@ -128,7 +127,7 @@ def test_a_rough_box_comes_near_the_truth(
 
 def test_outlines_tell_more_than_their_boxes():
     by_boxes, by_outlines = [], []
-    for seed in range(4):
+    for seed in range(2):
         random = np.random.default_rng(seed)
         Ts, box = round_about(3, random), thing(random)
         by_boxes.append(fit_box(roughly(box, random), boxes_seen(BROWN, Ts, box, random)).corner_error)
@@ -198,7 +197,7 @@ def aside(angle: float) -> np.ndarray:
 
 
 def test_a_wrong_frame_is_named_and_counts_for_little():
-    for seed in range(4):
+    for seed in range(2):
         random = np.random.default_rng(seed)
         Ts, box = round_about(7, random), thing(random)
         seen = boxes_seen(BROWN, Ts, box, random)
@@ -267,7 +266,7 @@ class TestWhatCannotBeFitted:
         with pytest.raises(BadInput, match="frame 2 is given twice"):
             fit_box(self.start, [*self.seen[:4], self.seen[2]])
 
-    @pytest.mark.parametrize("degrees", [0.0, 1.0, 3.0])
+    @pytest.mark.parametrize("degrees", [0.0, 3.0])
     def test_frames_from_one_side(self, degrees: float):
         there = self.Ts[0] @ rigid_transform.from_rotation(np.eye(3), np.zeros(3))
         turn = rigid_transform.from_rotation(rigid_transform.rotation_about_z(np.radians(degrees)), np.zeros(3))
