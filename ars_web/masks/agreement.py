@@ -18,6 +18,9 @@ from ars_web.masks.close_up import Cells, CloseUp
 CUTS_NOTHING = 0.02
 """The share of another outline that one may cut away: what two careful outlines differ by."""
 
+MOST_SETS = 6
+"""Of outlines that agree, that are looked for."""
+
 
 Outline = tuple[Cells, Bool[np.ndarray, "r c"]]
 """A close-up in squares, and those inside an outline."""
@@ -82,9 +85,11 @@ class Bench:
         sound = sorted((f for f in found if drawn_cut[f] <= CUTS_NOTHING), key=lambda f: (-trust[f], drawn_cut[f], f))
         best = self._together(sound, masks, left)
         tried = set(best.accepted)
-        for first in sound:
-            if first in tried:
-                continue
+        for _ in range(MOST_SETS - 1):
+            first = next((frame for frame in sound if frame not in tried), None)
+            if first is None:
+                break
+            tried.add(first)
             other = self._together([first, *(frame for frame in sound if frame != first)], masks, left)
             tried.update(other.accepted)
             if sum(trust[frame] for frame in other.accepted) > sum(trust[frame] for frame in best.accepted):

@@ -20,7 +20,7 @@ from ars_web.geometry.mask_regions import polygons_of, region
 from ars_web.geometry.mesh_silhouette import silhouette
 from ars_web.geometry.rigid_transform import invert, transform_points
 from ars_web.geometry.visual_hull import View, VisualHull, visual_hull
-from ars_web.masks.agreement import Agreement, Bench
+from ars_web.masks.agreement import CUTS_NOTHING, Agreement, Bench
 from ars_web.masks.candidate_frames import candidate_frames
 from ars_web.masks.close_up import CloseUp, close_up
 from ars_web.masks.proposals import Palette, edge_agreement
@@ -205,9 +205,12 @@ def _sorted_out(
         frame: "nothing there looks like the outlines that were drawn" for frame in bench.shots if frame not in found
     }
     for frame, (share, other) in agreement.cuts.items():
-        told = (
-            f"it would cut away {share:.0%} of what frame {other} shows: something hides the object, or looks like it"
-        )
+        if share > CUTS_NOTHING:
+            hidden = "something hides the object, or looks like what is behind it"
+            told = f"it would cut away {share:.0%} of what frame {other} shows: {hidden}"
+        else:
+            beyond = 1 - bench.seen_by_others(agreement, frame, found[frame])
+            told = f"{beyond:.0%} of it is more than the other frames leave of the object"
         (doubts if share <= CUTS_LITTLE else dropped)[frame] = told
     sound: list[int] = []
     for frame in agreement.accepted:
@@ -216,7 +219,7 @@ def _sorted_out(
         if edges < EDGES_AGREE:
             doubts[frame] = f"{1 - edges:.0%} of its outline follow no edge in the photograph"
         elif seen < SEEN_SMALLER:
-            doubts[frame] = f"by the other frames the object is {1 - seen:.0%} smaller than this outline"
+            doubts[frame] = f"{1 - seen:.0%} of it is more than the other frames leave of the object"
         else:
             sound.append(frame)
     kept = np.ones(len(bench.points), dtype=np.bool_)
