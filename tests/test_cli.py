@@ -278,6 +278,8 @@ def test_what_is_wrong_with_the_input_ends_with_1_and_one_line(
     unwritten = one_line(run("boxes", "export", session, tmp_path / "nowhere" / "boxes.json", status=1))
     assert f"there is no folder {tmp_path / 'nowhere'}" in unwritten
     assert "not empty" in one_line(run("import", recording, "--name", "", status=1))
+    assert "no such file" in one_line(run("serve", "--port", "0", "--segmenter", tmp_path / "none.onnx", status=1))
+    assert "boxes.json" in one_line(run("serve", "--port", "0", "--segmenter", damaged, status=1))
 
 
 def test_a_folder_whose_name_is_not_utf8_is_refused_in_one_line(run: Commands, recording: Path) -> None:
