@@ -88,6 +88,71 @@ def boxes_from_masks(
         raise refused[-1]
 
 
+@app.command("refine")
+def refine_box(
+    session: take.Session,
+    box_id: Annotated[int, typer.Argument(metavar="BOX", help="The box's id.")],
+    file: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="[FILE]", help="JSON as POST boxes/BOX/refine takes it; - for stdin; default: its masks."
+        ),
+    ] = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say how the box would fit, and leave it.")] = False,
+    sessions: take.Sessions = take.SESSIONS,
+    as_json: take.Json = False,
+) -> None:
+    """Move, turn and size a box until its labels agree best with its masks, or with what a file says is seen.
+
+    It is one step that one undo takes back. How far each side of a label is off is printed for each frame.
+    """
+    from ars_web.masks.box_fitting import BoxFitting
+    from ars_web.masks.fit_json import FitJson, fitted_json, read_fit_file, sightings_of
+    from ars_web.masks.views import photographs
+    from ars_web.sessions.drafting import existing_box
+    from ars_web.sessions.editing import SessionEditor
+    from ars_web.sessions.store import SessionStore
+
+    wish = FitJson()  # pyright: ignore[reportCallIssue]: it knows no defaults behind Annotated
+    if file is not None:
+        is_file = str(file) != "-"
+        wish = read_fit_file(
+            file if is_file else "standard input", file.read_bytes() if is_file else sys.stdin.buffer.read()
+        )
+    with SessionStore(sessions) as store:
+        sid = store.find(session)
+        fitting = BoxFitting(store, SessionEditor(store))
+        seen = None if wish.views is None else sightings_of(photographs(store, sid), wish.views)
+        before = existing_box(store.state(sid), box_id)
+        if dry_run or wish.dry_run:
+            fitted = fitting.try_fit(sid, box_id, seen, orientation=wish.orientation)
+        else:
+            fitted = fitting.fit(
+                sid,
+                box_id,
+                seen,
+                orientation=wish.orientation,
+                expected_revision=before.revision,
+                author=AUTHOR,
+            )
+    if as_json:
+        print_json(fitted_json(fitted))
+        return
+    rows = [
+        (frame, *(f"{side:+.1f}" for side in sides), "stands out" if outlier else "")
+        for frame, sides, outlier in zip(
+            fitted.frames, fitted.fit.residuals_px.tolist(), fitted.fit.outliers.tolist(), strict=True
+        )
+    ]
+    print_table(("frame", "left, px", "top, px", "right, px", "bottom, px", ""), rows)
+    print(
+        f"{fitted.box.name}: {_millimetres(fitted.box)} mm, moved by {1e3 * fitted.moved:.1f} mm,"
+        f" {fitted.fit.rms_px:.1f} px off on the average"
+    )
+    for warning in fitted.warnings:
+        note(f"ars-web: {warning}")
+
+
 @app.command("export")
 def export_boxes(
     session: take.Session,

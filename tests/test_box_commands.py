@@ -128,3 +128,49 @@ def test_an_empty_list_and_a_file_that_is_not_there(make, sessions: Path, tmp_pa
     assert make([]) == ("", "")
     assert run(["boxes", "from-masks", "ring", str(tmp_path / "no.json"), "--sessions", str(sessions)]) == 1
     assert "no.json: No such file" in capsys.readouterr().err
+
+
+@pytest.fixture
+def refine(sessions: Path, capsys: pytest.CaptureFixture[str]):
+    """What `boxes refine` prints on either stream."""
+
+    def ask(*arguments: str, status: int = 0) -> tuple[str, str]:
+        found = run(["boxes", "refine", "ring", *arguments, "--sessions", str(sessions)])
+        out, err = capsys.readouterr()
+        assert found == status, err
+        return out, err
+
+    return ask
+
+
+def test_a_box_is_fitted_to_its_masks(make, refine, ball, sessions: Path) -> None:
+    make(ball(0, 2, 5, 7, 9))
+    (made,) = boxes_in(sessions)
+    out, err = refine(str(made.id), "--dry-run")
+    *rows, told = out.splitlines()
+    assert [row.split()[0] for row in rows] == ["frame", "0", "2", "5", "7", "9"]
+    assert "moved by" in told
+    assert "does not fill a box" in err
+    assert boxes_in(sessions)[0].revision == made.revision
+    found = json.loads(refine(str(made.id), "--json")[0])
+    (after,) = boxes_in(sessions)
+    assert found["box"]["size"] == after.box.size.tolist()
+    assert after.box.volume < made.box.volume
+    assert after.hull is not None
+
+
+def test_a_box_is_fitted_to_what_a_file_says(make, refine, ball, sessions: Path, ring_scene, tmp_path: Path) -> None:
+    make(ball(0, 3))
+    bounds = {frame: ring_scene.outline(frame) for frame in (0, 2, 5, 7, 9)}
+    views = [
+        {"frame": frame, "bbox": [*ring.min(axis=0).tolist(), *ring.max(axis=0).tolist()]}
+        for frame, ring in bounds.items()
+    ]
+    file = tmp_path / "seen.json"
+    file.write_text(json.dumps({"views": views, "orientation": "upright"}))
+    found = json.loads(refine("1", str(file), "--json")[0])
+    assert [row["frame"] for row in found["residuals"]] == [0, 2, 5, 7, 9]
+    assert found["box"]["T_world_box"]["position"] == pytest.approx(list(ring_scene.CENTRE), abs=3e-3)
+    file.write_text(json.dumps({"views": [{"frame": 0}]}))
+    assert "seen.json: views[0]: give bbox, polygons or mask_png" in refine("1", str(file), status=1)[1]
+    assert "box 9 is not in this session" in refine("9", status=1)[1]

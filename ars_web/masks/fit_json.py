@@ -1,11 +1,13 @@
 """What a box is to be fitted to, and how well it fits, as the JSON of the API and of the command line."""
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from ars_web.errors import BadFile
 from ars_web.geometry.box_parameters import Orientation
 from ars_web.geometry.box_sighting import Sighting, sighting_of_region
 from ars_web.geometry.mask_regions import region
@@ -13,6 +15,7 @@ from ars_web.masks.box_fitting import FittedBox
 from ars_web.masks.masks_json import MOST_VIEWS, Coordinate, MaybeOutlineJson, ViewJson, outlines_of
 from ars_web.masks.views import Photographed, camera_of, views_of
 from ars_web.sessions.boxes_json import Flag, Id, box_json
+from ars_web.sessions.strict_json import first_fault, place_text, strict_json
 
 
 class SeenJson(MaybeOutlineJson):
@@ -71,6 +74,23 @@ def sightings_of(taken: Photographed, views: Sequence[SeenJson]) -> list[Sightin
         )
         for view in views
     ]
+
+
+def read_fit_file(path: Path | str, data: bytes) -> FitJson:
+    """What a JSON file asks a box to be fitted to, as `POST …/refine` takes it.
+
+    Args:
+        path: what to call the file that `data` was read from.
+
+    Raises:
+        BadFile: it is no such file; the message says which of its values.
+    """
+    try:
+        return FitJson.model_validate(strict_json(data, path))
+    except ValidationError as error:
+        place, message = first_fault(error)
+        where = place_text(place).lstrip(".")
+        raise BadFile(path, f"{where}: {message}" if where else message) from error
 
 
 def fitted_json(fitted: FittedBox) -> dict[str, Any]:
