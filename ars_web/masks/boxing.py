@@ -155,6 +155,7 @@ class ObjectBoxes:
                     origin=origin,
                     accepted=accepted,
                     expected_revision=None,
+                    unmade=accepted,
                     author=author,
                     key=key,
                 )
@@ -208,7 +209,8 @@ class ObjectBoxes:
                 before.accepted if accepted is None else accepted,
             )
             box = state.boxes.get(before.box_id)
-            if box is None or not ((before.accepted or draft.accepted) and _follows(box)):
+            counts = before.accepted or draft.accepted
+            if box is None or not (counts and _follows(box)):
                 return self._editor.put_mask(
                     sid,
                     box_id=before.box_id,
@@ -217,6 +219,7 @@ class ObjectBoxes:
                     origin=draft.origin,
                     accepted=draft.accepted,
                     expected_revision=before.revision,
+                    unmade=counts,
                     author=author,
                 )
             deed = "Change" if before.accepted == draft.accepted else "Accept" if draft.accepted else "Set aside"
@@ -233,7 +236,9 @@ class ObjectBoxes:
             mask = mask_at(state, mask_id, expected_revision)
             box = state.boxes.get(mask.box_id)
             if box is None or not (mask.accepted and _follows(box)):
-                self._editor.delete_mask(sid, mask_id, expected_revision=expected_revision, author=author)
+                self._editor.delete_mask(
+                    sid, mask_id, expected_revision=expected_revision, unmade=mask.accepted, author=author
+                )
                 return
             summary = f"Delete outline of {box.name} in frame {mask.frame}"
             self._made(sid, state, box.id, drop=mask, summary=summary, author=author)

@@ -56,6 +56,17 @@ def object_name(state: SessionState, box_id: int, class_id: int) -> str:
     return f"a new {state.classes[class_id].name}" if box is None else box.name
 
 
+def refuse_made(state: SessionState, box_id: int | None) -> None:
+    """Refuse where the object's box is made from its masks.
+
+    Raises:
+        Conflict: it is; `current` is the box.
+    """
+    box = state.boxes.get(box_id or 0)
+    if box is not None and box.hull_options is not None:
+        raise Conflict(f"box {box.id} ({box.name!r}) was made from its masks meanwhile", current=box)
+
+
 def mask_at(state: SessionState, mask_id: int, expected_revision: int) -> Mask:
     """The mask, which must be at `expected_revision`.
 

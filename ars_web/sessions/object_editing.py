@@ -21,6 +21,7 @@ from ars_web.sessions.object_drafting import (
     no_change,
     object_changes,
     object_name,
+    refuse_made,
 )
 from ars_web.sessions.outlines import checked_polygons, polygons_json
 
@@ -39,20 +40,23 @@ class ObjectEditing(EditDoor):
         origin: Origin = "drawn",
         accepted: bool = True,
         expected_revision: int | None,
+        unmade: bool = False,
         author: str,
         key: str | None = None,
     ) -> Mask:
         """Give an object this outline in a frame; the box, if it has one, stays as it is.
 
         `box_id` names the box, or an object that has masks and no box yet; None: a new object, for whose box the next
-        id is kept. `class_id` None: the object's own. `expected_revision` None: it has no mask there yet. A repeat
-        with the same idempotency `key` returns what the first returned, and changes nothing.
+        id is kept. `class_id` None: the object's own. `expected_revision` None: it has no mask there yet. `unmade`: no
+        box is made from the object's masks. A repeat with the same idempotency `key` returns what the first returned,
+        and changes nothing.
 
         Raises:
             BadInput: there is no such frame or class, the box is of another class, or the outline cannot be used (see
                 `checked_polygons`).
             NotFound: the object has neither box nor masks.
-            Conflict: the mask in that frame is another one; `current` is it, or None.
+            Conflict: the mask in that frame is another one; `current` is it, or None. Or there is a box that is made
+                from masks, and there should be none; `current` is the box.
             Locked: the box is.
         """
         (draft,) = self._checked(sid, [MaskDraft(frame, tuple(polygons), origin, accepted)])
@@ -62,6 +66,8 @@ class ObjectEditing(EditDoor):
             if answered is not None:
                 return _first_mask(answered)
             state = session.state
+            if unmade:
+                refuse_made(state, box_id)
             changes = mask_changes(state, draft, box_id=box_id, class_id=class_id, expected_revision=expected_revision)
             before, after = changes[0].before, changes[0].after
             assert after is not None
@@ -72,17 +78,20 @@ class ObjectEditing(EditDoor):
             edit = self._append(session, changes, author=author, summary=summary, key=key, digest=digest)
         return _first_mask(edit)
 
-    def delete_mask(self, sid: str, mask_id: int, *, expected_revision: int, author: str) -> None:
+    def delete_mask(self, sid: str, mask_id: int, *, expected_revision: int, unmade: bool = False, author: str) -> None:
         """Take a mask away; undo brings it back. The box, if there is one, stays as it is.
 
         Raises:
             NotFound: there never was such a mask.
-            Conflict: it is not at that revision; `current` is the mask, or None.
+            Conflict: it is not at that revision; `current` is the mask, or None. With `unmade`, there is a box that is
+                made from masks; `current` is the box.
             Locked: its box is.
         """
         with self._editing(sid) as session:
             state = session.state
             mask = mask_at(state, mask_id, expected_revision)
+            if unmade:
+                refuse_made(state, mask.box_id)
             box = state.boxes.get(mask.box_id)
             if box is not None:
                 refuse_locked(box, "masks")

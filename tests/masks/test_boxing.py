@@ -19,16 +19,27 @@ from ars_web.sessions.store import SessionStore
 
 
 class Interrupting(SessionEditor):
-    """An editor to whose session something happens just before an object is put."""
+    """An editor to whose session something happens just before an object or a mask is put, or one deleted."""
 
     def __init__(self, store: SessionStore) -> None:
         super().__init__(store)
         self.before_put: list[Any] = []
 
     def put_object(self, *positional: Any, **named: Any) -> Any:
+        self._interrupt()
+        return super().put_object(*positional, **named)
+
+    def put_mask(self, *positional: Any, **named: Any) -> Any:
+        self._interrupt()
+        return super().put_mask(*positional, **named)
+
+    def delete_mask(self, *positional: Any, **named: Any) -> Any:
+        self._interrupt()
+        return super().delete_mask(*positional, **named)
+
+    def _interrupt(self) -> None:
         if self.before_put:
             self.before_put.pop(0)()
-        return super().put_object(*positional, **named)
 
 
 class Ball:
@@ -150,6 +161,33 @@ def test_whoever_is_overtaken_again_and_again_is_told(ball: Ball) -> None:
         ball.change(mask, polygons=ball.outline(0, radius=0.03))
     ball.editor.before_put = [rename] * (boxing.TRIES - 1)
     assert ball.change(mask, polygons=ball.outline(0, radius=0.03)).frame == 0
+
+
+@pytest.mark.parametrize("deed", ["add", "change", "delete"])
+def test_a_box_that_is_made_meanwhile_follows_all_the_same(ball: Ball, deed: str) -> None:
+    first = ball.objects.add_mask(ball.sid, box_id=None, frame=0, class_id=0, polygons=ball.outline(0), author="ann")
+    for frame in (3, 9):
+        ball.objects.add_mask(
+            ball.sid, box_id=first.box_id, frame=frame, class_id=0, polygons=ball.outline(frame), author="ann"
+        )
+
+    def make() -> None:
+        ball.objects.remake(ball.sid, first.box_id, options=HullOptions(), author="bob")
+
+    ball.editor.before_put = [make]
+    smaller = ball.outline(9, radius=0.03)
+    if deed == "add":
+        ball.objects.add_mask(
+            ball.sid, box_id=first.box_id, frame=7, class_id=0, polygons=ball.outline(7), author="ann"
+        )
+    elif deed == "change":
+        ball.change(ball.mask(9), polygons=smaller)
+    else:
+        ball.objects.delete_mask(ball.sid, ball.mask(9).id, expected_revision=ball.mask(9).revision, author="ann")
+    left = ball.volume
+    (box,) = ball.state.boxes.values()
+    again = ball.objects.remake(ball.sid, box.id, options=HullOptions(), expected_revision=box.revision, author="ann")
+    assert hull_of(ball.store, ball.sid, again).volume == pytest.approx(left, rel=1e-9)
 
 
 def test_a_change_that_changes_nothing_makes_no_edit(ball: Ball) -> None:
