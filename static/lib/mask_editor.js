@@ -37,6 +37,7 @@ import { effect, signal } from "./view.js";
  * @property {import("./view.js").ReadonlySignal<Operation>} operation
  * @property {(polygons: Polygons, shape: Shape, operation: "add" | "subtract") => Promise<Polygons>} combine
  * @property {(prompt: import("./mask_tools/smart_tool.js").Prompt) => Promise<Polygons>} segment
+ * @property {() => void} onNew a shape has taken the place of the mask, as the operation said
  * @property {(text: string | null) => void} onFailure
  * @property {(text: string) => void} onSay for who does not see it
  * @property {(view: import("./image_view.js").View) => void} onView
@@ -130,7 +131,7 @@ export class MaskEditor {
       {
         onPress: (at, event) => (this.#look.locked ? null : (this.#begin(), this.#tool.press(at, event))),
         onClick: (at, event) => !this.#look.locked && this.#tool.click(at, event),
-        onDoubleClick: () => this.#tool.doubleClick(),
+        onDoubleClick: () => !this.#look.locked && this.#tool.doubleClick(),
         onHover: (at, by) => this.#tool.hover(at, by),
         onChoosePoint: (id) => corners.owns(id) && corners.choose(id),
         onClickPoint: (id) => ring.owns(id) && ring.clicked(id),
@@ -215,21 +216,27 @@ export class MaskEditor {
   }
 
   /**
-   * A key that was pressed in the pane; arrows, Enter and zoom are taken by it before.
+   * A key that was pressed in the pane; arrows, Enter and zoom it takes itself. But for Delete, where nothing is chosen,
+   * what takes back or moves something is never the page's.
    * @param {KeyboardEvent} event
    * @returns {boolean} whether it stood for something
    */
   key(event) {
     const { key } = event;
-    if (this.#look.locked || event.altKey) return false;
+    const edits = ["Backspace", "PageUp", "PageDown", "Insert"].includes(key);
+    if (this.#look.locked || event.altKey) return edits;
     if (event.ctrlKey || event.metaKey) {
       if (key.toLowerCase() === "z") return event.shiftKey ? this.redo() : this.undo();
       return key.toLowerCase() === "y" && this.redo();
     }
-    if (key === "Backspace" || key === "Delete") return this.ring.back() || (this.#tool.showsCorners && (event.shiftKey ? this.corners.removeRing() : this.corners.remove()));
-    if (!this.#tool.showsCorners) return false;
-    if (key === "PageDown" || key === "PageUp") return this.corners.walk(key === "PageDown" ? 1 : -1);
-    return key === "Insert" && this.corners.insert();
+    const { showsCorners } = this.#tool;
+    if (key === "Backspace" || key === "Delete") {
+      const isDone = this.ring.back() || (showsCorners && (event.shiftKey ? this.corners.removeRing() : this.corners.remove()));
+      return isDone || edits;
+    }
+    if (showsCorners && (key === "PageDown" || key === "PageUp")) this.corners.walk(key === "PageDown" ? 1 : -1);
+    else if (showsCorners && key === "Insert") this.corners.insert();
+    return edits;
   }
 
   get #tool() {
@@ -301,6 +308,7 @@ export class MaskEditor {
         if (operation !== "new" && sheet.settled !== base) continue;
         this.#host.onFailure(null);
         sheet.set(result, step);
+        if (operation === "new") this.#host.onNew();
         return true;
       } catch (error) {
         this.#host.onFailure(`This was not drawn: ${/** @type {Error} */ (error).message}`);

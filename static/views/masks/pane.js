@@ -45,6 +45,7 @@ export function MaskPane(props) {
       operation: drawing.operation,
       combine: (polygons, shape, operation) => actions.combine({ frame: newest.current.frame, polygons, operation, ...shape }),
       segment: (prompt) => actions.segment(newest.current.frame, prompt),
+      onNew: () => (drawing.operation.value = "add"),
       onFailure: (text) => (failure.value = text),
       onSay: (text) => (said.value = text),
       onView: (view) => (zoom.value = view.zoom),
@@ -147,9 +148,8 @@ function isField(target) {
 }
 
 /** By the brackets, wherever the focus is. @param {KeyboardEvent} event @returns {boolean} */
-function sizeBrush({ key, ctrlKey, metaKey }) {
-  // AltGr, by which many keyboards write brackets, is told as Ctrl and Alt together.
-  if ((key !== "[" && key !== "]") || metaKey || (ctrlKey && !"[]".includes(key))) return false;
+function sizeBrush({ key }) {
+  if (key !== "[" && key !== "]") return false;
   if (!["brush", "eraser", "smart"].includes(drawing.tool.peek())) return false;
   const now = drawing.brush.peek();
   const step = Math.max(1, Math.round(now / 8));

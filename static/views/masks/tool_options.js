@@ -10,8 +10,8 @@ import { drawing, LEAST_BRUSH, MOST_BRUSH } from "./drawing.js";
 /** @type {readonly [import("../../lib/mask_editor.js").Operation, string, string][]} */
 const OPERATIONS = [
   ["new", "New", "The next shape takes the place of the mask"],
-  ["add", "Add", "The next shape joins the mask"],
-  ["subtract", "Cut out", "The next shape is cut out of the mask: a bite, or a hole (hold Alt)"],
+  ["add", "Add", "Shapes join the mask"],
+  ["subtract", "Cut out", "Shapes are cut out of the mask: bites, or holes (hold Alt)"],
 ];
 /** @type {readonly [import("../../lib/mask_tools/smart_tool.js").Marking, string, string][]} */
 const MARKINGS = [
@@ -42,7 +42,7 @@ export function ToolOptions({ editor, sheet }) {
   const chosen = editor.corners.chosen.value !== null;
   return html`<div class="tool-options" role="group" aria-label="Tool options">
     ${tool === "smart" && html`<${Smart} editor=${editor} />`}
-    ${["polygon", "lasso", "rectangle"].includes(tool) && drawn && open === null && html`<${Choice} label="What the next shape does" choices=${OPERATIONS} value=${drawing.operation.value} onChoose=${(/** @type {any} */ next) => (drawing.operation.value = next)} />`}
+    ${drawn && open === null && (["polygon", "lasso", "rectangle"].includes(tool) || (tool === "smart" && editor.smart.marking === "box")) && html`<${Choice} label="What the next shape does" choices=${OPERATIONS} value=${drawing.operation.value} onChoose=${(/** @type {any} */ next) => (drawing.operation.value = next)} />`}
     ${(tool === "brush" || tool === "eraser") && html`<${BrushSize} />`}
     ${open !== null &&
     html`<div class="chip">

@@ -286,6 +286,18 @@ def test_all_of_it_can_be_done_by_keys(drawing: Drawing) -> None:
     page.keyboard.press("Control+z")
     assert drawing.ring(8) == pytest.approx(ring)
 
+    # Keys that remove and move are the outline's, even where there is none: a selected box stays as it is.
+    boxes = drawing.workspace.answer("/boxes")
+    page.evaluate("(id) => import('/static/store.js').then((store) => store.actions.select(id))", boxes[0]["id"])
+    expect(page.get_by_role("application", name=f"Outline of {boxes[0]['name']}, frame {FRAME}")).to_be_visible()
+    drawing.canvas.focus()
+    for key in ("Delete", "Backspace", "PageUp", "PageDown", "ArrowUp", "p", "Delete", "PageUp"):
+        page.keyboard.press(key)
+    page.keyboard.press("t")
+    drawing.drag((100, 100), (150, 150))
+    assert len(drawing.saved(9)) == 2
+    assert drawing.workspace.answer("/boxes") == boxes
+
 
 def test_what_the_server_does_not_take_stays_open_with_the_reason(drawing: Drawing) -> None:
     page = drawing.page
