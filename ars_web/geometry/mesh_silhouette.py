@@ -57,7 +57,9 @@ def silhouette(
         if not piece.is_empty():
             outer, *holes = (_bent(camera, ring / scale) for ring in piece.to_polygons())
             pieces.append(shapely.make_valid(shapely.Polygon(outer, holes)))
-    found = shapely.get_parts(shapely.get_parts(shapely.GeometryCollection(pieces)))
+    # Pieces that touch may overlap by rounding once they are bent.
+    whole = pieces[0] if len(pieces) == 1 else shapely.union_all(pieces)
+    found = shapely.get_parts(shapely.get_parts(whole))
     return shapely.MultiPolygon([part for part in found if isinstance(part, shapely.Polygon)])
 
 
@@ -95,7 +97,7 @@ def _beyond_near(
     return points, np.concatenate(pieces)
 
 
-def _border(faces: Int[np.ndarray, "f 3"]) -> list[Int[np.ndarray, "k"]]:
+def _border(faces: Int[np.ndarray, "f 3"]) -> list[Int[np.ndarray, "_"]]:
     """Loops of vertices round triangles: the edges that are run along once more in one direction than in the other.
 
     As many edges lead to a vertex as away from it, so any walk along them comes back.
