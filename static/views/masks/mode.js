@@ -104,7 +104,7 @@ function Arrangement() {
 
 /** A small picture of an arrangement. @param {{count: number}} props */
 function Layout({ count }) {
-  const lines = ["", "M8 2V14", "M6 2V14M10 2V14", "M8 2V14M2 8H14"][count - 1];
+  const lines = ["", "M8 2V14", "M8 2V14M8 8H14", "M8 2V14M2 8H14"][count - 1];
   return html`<svg width="16" height="16" viewBox="0 0 16 16" aria-hidden="true" fill="none" stroke="currentColor" stroke-width="1.3">
     <rect x="1.5" y="2" width="13" height="12" rx="2" /><path d=${lines} />
   </svg>`;

@@ -15,6 +15,9 @@ import { adopt, disown, idOf, keyOf } from "./subject.js";
  */
 export const refused = signal(/** @type {ReadonlyMap<string, string>} */ (new Map()));
 
+/** Milliseconds until what the server did not answer is sent again. */
+const AGAIN = 2000;
+
 /** What each drawing was last made equal to, as the revision of a mask. @type {Map<string, number>} */
 const shown = new Map();
 /** Drawings that are on their way to the server, with what they are by now. @type {Map<string, readonly Polygon[]>} */
@@ -23,6 +26,8 @@ const going = new Map();
 const arrivals = signal(0);
 /** The class of each object that was drawn here. @type {Map<string, number>} */
 const classOf = new Map();
+/** Drawings that the server did not answer for, and that are sent again. @type {Map<string, ReturnType<typeof setTimeout>>} */
+const unsent = new Map();
 /** One after the other for each object: the first mask of a new one tells its id. @type {Map<string, Promise<void>>} */
 const queues = new Map();
 
@@ -59,12 +64,18 @@ function stored(key, frame) {
 /** @param {string} key @param {number} frame @param {readonly Polygon[]} polygons */
 async function save(key, frame, polygons) {
   const at = place(key, frame);
+  if (unsent.has(at)) {
+    clearTimeout(unsent.get(at));
+    unsent.delete(at);
+    store.unsaved.value -= 1;
+  }
   const isFirst = !going.has(at);
   going.set(at, polygons);
   // What is under way takes the newest when its turn comes.
   if (!isFirst) return;
   const before = queues.get(key) ?? Promise.resolve();
-  const done = before.then(() => send(key, frame));
+  const next = () => send(key, frame);
+  const done = before.then(next, next);
   queues.set(key, done);
   await done;
 }
@@ -107,7 +118,11 @@ async function send(key, frame) {
     arrivals.value += 1;
   }
   // Where somebody else's outline came between, it is shown by now.
-  if (failure !== null) refuse(key, frame, failure);
+  if (failure === null) return;
+  refuse(key, frame, failure);
+  if (failure.status !== 0) return;
+  store.unsaved.value += 1;
+  unsent.set(at, setTimeout(() => void save(key, frame, sheet.settled), AGAIN));
 }
 
 /**

@@ -300,3 +300,22 @@ def test_the_machine_outlines_the_rest_in_one_step(
         narrower = workspace.answer(f"/boxes/{made['id']}")
         true = demo_recording.objects[BALL].box.size
         assert np.abs(np.array(narrower["size"]) - true).max() < np.abs(np.array(made["size"]) - true).max()
+
+
+def test_what_is_drawn_while_the_server_does_not_answer_is_stored_once_it_does(
+    demo_recording: DemoTruth, boxed_session, open_flatly, alone: Alone
+) -> None:
+    with open_flatly(*boxed_session, **LARGE) as workspace:
+        page = workspace.page
+        in_masks(page, FRAMES)
+        page.route("**/masks", lambda route: route.abort())
+        draw(page, FRAMES[0], outline(alone(FRAMES[0], BALL)), demo_recording)
+        told = page.get_by_role("region", name=f"Frame {FRAMES[0]}", exact=True).get_by_role("alert")
+        expect(told).to_contain_text("Not stored: The server does not answer")
+        expect(page.get_by_role("status").filter(has_text="Saving")).to_be_visible()
+        assert workspace.answer("/masks") == []
+        page.unroute("**/masks")
+        saved(page, 1)
+        expect(told).to_have_count(0)
+        assert [mask["frame"] for mask in workspace.answer("/masks")] == [FRAMES[0]]
+        workspace.complaints.clear()  # Chromium tells of what did not arrive
