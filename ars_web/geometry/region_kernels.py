@@ -79,6 +79,10 @@ def bbox_in_image(width: float, height: float, margin: float, sides: Array, bbox
         u0, v0, u1, v1 = sides[i, 0] + margin, sides[i, 1] + margin, sides[i, 2] + margin, sides[i, 3] + margin
         if (u0 < 0.0 and u1 < 0.0) or (u0 > wide and u1 > wide) or (v0 < 0.0 and v1 < 0.0) or min(v0, v1) > high:
             continue
+        if min(u0, u1) >= 0.0 and max(u0, u1) <= wide and min(v0, v1) >= 0.0 and max(v0, v1) <= high:
+            grow_bbox(bbox, u0, v0)
+            grow_bbox(bbox, u1, v1)
+            continue
         start, end = in_image(wide, high, u0, v0, u1, v1)
         if start <= end:
             grow_bbox(bbox, u0 + start * (u1 - u0), v0 + start * (v1 - v0))
@@ -153,13 +157,15 @@ def areas(width: float, height: float, sides: Array) -> tuple[float, float]:
     strip all sides are straight and in one order, so that what lies between two of them is a trapezium.
     """
     n = len(sides)
-    upper, lower, turns = np.empty(n), np.empty(n), np.empty(n, np.int64)
+    upper, lower, slopes, turns = np.empty(n), np.empty(n), np.empty(n), np.empty(n, np.int64)
     # Each end of a side is another's start.
     starts = np.empty(n + 2)
     for i in range(n):
         v0, v1 = sides[i, 1], sides[i, 3]
         upper[i], lower[i], turns[i] = min(v0, v1), max(v0, v1), -1 if v0 > v1 else 1
         starts[i] = v0
+        # A side along a strip's border is in none.
+        slopes[i] = (sides[i, 2] - sides[i, 0]) / (v1 - v0) if v0 != v1 else 0.0
     starts[n], starts[n + 1] = 0.0, height
     levels = starts[np.argsort(starts)]
     order = np.argsort(upper)
@@ -186,8 +192,7 @@ def areas(width: float, height: float, sides: Array) -> tuple[float, float]:
             continue
         for i in range(count):
             side = active[i]
-            u0, v0, u1, v1 = sides[side, 0], sides[side, 1], sides[side, 2], sides[side, 3]
-            slope = (u1 - u0) / (v1 - v0)
+            u0, v0, slope = sides[side, 0], sides[side, 1], slopes[side]
             top[side], bottom[side] = u0 + (va - v0) * slope, u0 + (vb - v0) * slope
             keys[side] = top[side] + bottom[side]
         sort_active(keys, active, count)
