@@ -15,12 +15,32 @@ const GAP = 60;
 /** Of masks whose hull is asked for while one draws; the server takes no more. */
 const MOST_VIEWS = 32;
 
-const told = signal(/** @type {{key: string, preview: HullPreview} | null} */ (null));
+/** `blind`: the frames asked for that cannot show the object. */
+const told = signal(/** @type {{key: string, preview: HullPreview, blind: readonly number[]} | null} */ (null));
 /** Why the server does not say, in words. */
 export const trouble = signal(/** @type {string | null} */ (null));
 
 /** Of the object that is outlined; null: nothing is known of it. */
 export const guidance = computed(() => (told.value !== null && told.value.key === subject.value?.key ? told.value.preview : null));
+
+/** Whether a frame cannot show the object, by its outlines in others. @param {number} frame */
+export function isBlind(frame) {
+  return guidance.value !== null && guidance.value.problem === null && (told.value?.blind.includes(frame) ?? false);
+}
+
+/** The frames in which nothing of where the object lies is within the image. @param {HullPreview} preview @param {readonly number[]} frames */
+async function outOfSight({ overlays }, frames) {
+  const cameras = await Promise.all(frames.map((frame) => store.actions.cameraOf(frame)));
+  return frames.filter((frame, i) => {
+    const { width, height } = cameras[i];
+    const seen = overlays.some((one) => one.frame === frame && one.polygons.some(({ outer }) => {
+      const [xs, ys] = [outer.map(([x]) => x), outer.map(([, y]) => y)];
+      return Math.min(...xs) < width && Math.max(...xs) > 0 && Math.min(...ys) < height && Math.max(...ys) > 0;
+    }));
+    // By its own outline alone, nothing is told of a frame.
+    return !seen && views.peek().some((view) => view.frame !== frame);
+  });
+}
 
 /** The outlines as they are seen now: what is drawn in the panes, and what is stored for other frames. */
 export const views = computed(() => {
@@ -51,8 +71,9 @@ export function connect() {
   const pace = paced(async (/** @type {Wish} */ { key, views, options, show_in }) => {
     try {
       const preview = await store.actions.previewHull(views, options, show_in);
+      const blind = await outOfSight(preview, show_in);
       if (!wanted) return;
-      told.value = { key, preview };
+      told.value = { key, preview, blind };
       trouble.value = null;
     } catch (error) {
       if (wanted) trouble.value = /** @type {Error} */ (error).message;
