@@ -73,6 +73,7 @@ function noteOf(frame, overlays) {
   const isOpen = subject.value !== null && drawing.of(subject.value.key, frame).open.value !== null;
   if (isOpen || guidance.views.value.some((view) => view.frame === frame)) return isOpen || mask === undefined ? "drawing" : WORDS[mask.origin];
   if (guidance.isBlind(frame)) return "the object is not in sight here: take another frame";
+  if (overlays.some(({ kind }) => kind === "hull")) return "the hull so far, seen from here";
   if (overlays.some(({ kind }) => kind === "band")) return "the object lies inside the dashed band";
   return guidance.views.value.length === 0 ? `outline ${subject.value?.name ?? "the object"} here` : "";
 }
