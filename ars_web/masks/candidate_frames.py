@@ -4,7 +4,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from scipy.spatial import ConvexHull
 
 from ars_web.geometry import rigid_transform
@@ -70,7 +70,7 @@ def _sights(taken: Photographed, hull: VisualHull) -> _Sights:
     points = _outermost(hull.vertices)
     shown, size = np.zeros(len(frames)), np.zeros(len(frames))
     for id_, camera in taken.cameras.items():
-        own: Int[np.ndarray, k] = np.flatnonzero(frames.camera_ids == id_)
+        own = np.flatnonzero(frames.camera_ids == id_)
         for start in range(0, len(own), AT_ONCE):
             block = own[start : start + AT_ONCE]
             Ts_camera_world = rigid_transform.invert(frames.Ts_world_camera[block])
