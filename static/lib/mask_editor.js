@@ -62,6 +62,7 @@ export class MaskEditor {
   #look = { color: BAND, guidance: [], locked: true };
   #pane;
   #zoom = 1;
+  #aimed = false;
   /** Shapes that the server is joining to a mask. @type {Set<{sheet: MaskSheet, shape: Shape, operation: Operation}>} */
   #pending = new Set();
   /** What is to be joined to a mask waits for what comes before it. @type {WeakMap<MaskSheet, Promise<unknown>>} */
@@ -92,6 +93,9 @@ export class MaskEditor {
       },
       get brush() {
         return host.brush.peek();
+      },
+      get aimed() {
+        return editor.#aimed;
       },
       get ring() {
         return ring;
@@ -130,9 +134,12 @@ export class MaskEditor {
       element,
       {
         onPress: (at, event) => (this.#look.locked ? null : (this.#begin(), this.#tool.press(at, event))),
-        onClick: (at, event) => !this.#look.locked && this.#tool.click(at, event),
+        onClick: (at, event) => this.#click(at, event),
         onDoubleClick: () => !this.#look.locked && this.#tool.doubleClick(),
-        onHover: (at, by) => this.#tool.hover(at, by),
+        onHover: (at, by) => {
+          this.#aimed ||= by === "keys" && at !== null;
+          this.#tool.hover(at, by);
+        },
         onChoosePoint: (id) => corners.owns(id) && corners.choose(id),
         onClickPoint: (id) => ring.owns(id) && ring.clicked(id),
         onMovePoint: (id, to, phase) => (ring.owns(id) ? ring.moved(id, to) : corners.owns(id) && corners.move(id, to, phase)),
@@ -243,8 +250,17 @@ export class MaskEditor {
     return this.#tools[this.#host.tool.peek()];
   }
 
+  /** @param {Place} at @param {import("./image_pane.js").Modifiers} event */
+  #click(at, event) {
+    if (this.#look.locked) return;
+    this.#host.onFailure(null);
+    if (!(event instanceof KeyboardEvent)) this.#aimed = false;
+    this.#tool.click(at, event);
+  }
+
   /** Before something is drawn. */
   #begin() {
+    this.#aimed = false;
     this.corners.settle();
     this.#host.onFailure(null);
   }

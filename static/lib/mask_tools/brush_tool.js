@@ -59,6 +59,7 @@ export class BrushTool extends MaskTool {
 
   /** @param {import("./tool.js").Place} at @param {import("./tool.js").Modifiers} event */
   click(at, event) {
+    if (!this.board.aimed) return this.board.say("Move the crosshair with the arrows, then press Enter.");
     this.#finish(this.#begin(cornerAt(at), event), this.#operation(event));
   }
 

@@ -30,6 +30,7 @@ export class RectangleTool extends MaskTool {
 
   /** @param {import("./tool.js").Place} at @param {import("./tool.js").Modifiers} event */
   click(at, event) {
+    if (!this.board.aimed) return this.board.say("Move the crosshair with the arrows, then press Enter.");
     if (this.#drawn !== null) return this.#finish(at);
     this.#drawn = { from: at, to: at, operation: this.board.operation(event), byKeys: true };
     this.board.say("First corner. Move on and press Enter for the other.");

@@ -70,8 +70,12 @@ export class SmartTool extends MaskTool {
     return { move: (to) => this.#stretch(to), end: () => this.#finish(event), cancel: () => this.#forget() };
   }
 
-  /** By keys. @param {Place} at @param {import("./tool.js").Modifiers} event */
+  /** By keys; where they aim at nothing, the outline is kept as it is. @param {Place} at @param {import("./tool.js").Modifiers} event */
   click(at, event) {
+    if (!this.board.aimed) {
+      if (!this.finish()) this.board.say("Move the crosshair with the arrows, then press Enter.");
+      return;
+    }
     if (this.#drawn?.byKeys) {
       this.#stretch(at);
       return this.#finish(event);
@@ -189,7 +193,7 @@ export class SmartTool extends MaskTool {
     const width = this.#width;
     /** @param {Marking} kind @param {readonly Corner[][]} marks @param {string} color */
     const strokes = (kind, marks, color) =>
-      [...marks, ...(drawn?.kind === kind ? [drawn.points] : [])].map((points) => ({ points, width, color, opacity: 0.8 }));
+      [...marks, ...(drawn?.kind === kind ? [drawn.points] : [])].map((points) => ({ points, width, color, opacity: 0.55 }));
     return {
       regions: box === null ? [] : [{ rings: [ringOf(box)], color: BOX, width: 1.5, dash: [6, 4] }],
       strokes: [...strokes("inside", inside, INSIDE), ...strokes("outside", outside, OUTSIDE)],

@@ -17,6 +17,7 @@
  * @property {number} zoom CSS pixels an image pixel
  * @property {string} color of the object
  * @property {number} brush its diameter, image pixels
+ * @property {boolean} aimed arrow keys put the crosshair where it is: Enter means that place
  * @property {import("./open_ring.js").OpenRing} ring
  * @property {import("./corners.js").Corners} corners
  * @property {(event: Modifiers) => Operation} operation what is chosen; with Alt, to cut out

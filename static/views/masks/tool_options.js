@@ -76,7 +76,7 @@ function Smart({ editor }) {
   return html`<${Choice} label="What the next drag is" choices=${MARKINGS} value=${smart.marking} onChoose=${(/** @type {any} */ next) => (smart.chosen.value = next)} />
     ${smart.busy.value
       ? html`<div class="chip"><${Icon} name="loader-circle" size=${14} /><span class="muted">Finding the outline</span></div>`
-      : begun && html`<button type="button" class="chip button" title="Keep this outline, and begin another (Escape)" onClick=${() => smart.finish()}>Keep</button>`}`;
+      : begun && html`<button type="button" class="chip button" title="Keep this outline, and begin another (Enter, Escape)" onClick=${() => smart.finish()}>Keep</button>`}`;
 }
 
 /**

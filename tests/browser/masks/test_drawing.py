@@ -323,13 +323,26 @@ def test_the_smart_tool_finds_an_object_from_a_rough_box(
 ) -> None:
     page = drawing.page
     page.keyboard.press("q")
-    names = [thing.name for thing in demo_recording.objects]
-    thing = names.index("tea") if "tea" in names else 0
-    truth = alone(FRAME, thing)
+    truth = alone(FRAME, [thing.name for thing in demo_recording.objects].index("tea"))
     rows, columns = np.nonzero(truth)
     box = (columns.min() - 8, rows.min() - 8, columns.max() + 9, rows.max() + 9)
     drawing.drag((box[0], box[1]), (box[2], box[3]))
     found = drawing.polygons(1)
     assert iou(found, polygons_from_mask(truth)) >= 0.85
-    (mask,) = drawing.workspace.answer("/masks")
+    (mask,) = drawing.saved(1)
     assert mask["origin"] == "smart"
+
+    # It is kept by Enter, and mended by marks: what is beside it is taken away.
+    keep = drawing.pane.get_by_role("button", name="Keep")
+    expect(keep).to_be_visible()
+    page.keyboard.press("Enter")
+    expect(keep).to_be_hidden()
+    part = columns < (columns.min() + columns.max()) / 2
+    row = float(np.median(rows[part]))
+    page.keyboard.down("Shift")
+    drawing.drag((columns.min() - 4, row), (columns.min() + 0.4 * np.ptp(columns), row))
+    page.keyboard.up("Shift")
+    mended = drawing.polygons(2)
+    assert region(mended).area < 0.97 * region(found).area
+    page.keyboard.press("Control+z")
+    assert iou(drawing.polygons(3), found) > 0.999
