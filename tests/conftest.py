@@ -32,6 +32,18 @@ install_import_hook(
             "triangulation",
             "epipolar",
             "box_sensitivity",
+            "box_parameters",
+            "box_sighting",
+            "box_fit",
+            "view_guess",
+            "next_view",
+            "mask_outlines",
+            "viewing_cone",
+            "cone_intersection",
+            "view_disagreement",
+            "visual_hull",
+            "hull_box",
+            "mesh_silhouette",
         )
     ],
     "beartype.beartype",
@@ -97,6 +109,12 @@ def ring_scene() -> ModuleType:
 def painted_ring() -> ModuleType:
     """`painted_ring.py`: the same recording with the object in its pictures."""
     return _beside("painted_ring")
+
+
+@pytest.fixture(scope="session")
+def tiny_network() -> ModuleType:
+    """`tiny_network.py`: writes small ONNX files."""
+    return _beside("tiny_network")
 
 
 def pytest_report_header() -> str:

@@ -75,8 +75,9 @@ def _trimap(prompt: SegmentPrompt, part: PromptPart) -> UInt8[np.ndarray, "h w"]
     x, y = part.centres
     within = part.within_reach
     trimap = np.where(within, cv2.GC_PR_BGD, cv2.GC_BGD).astype(np.uint8)
-    if prompt.start is not None:
-        trimap[part.of_mask(prompt.start) & within] = cv2.GC_PR_FGD
+    likely = within & part.of_mask(prompt.start) if prompt.start is not None else np.zeros_like(within)
+    if likely.any():
+        trimap[likely] = cv2.GC_PR_FGD
     elif prompt.rectangle is not None:
         # The corners of a rectangle round most objects show what is behind them.
         out = 2 * np.hypot((x - (x0 + x1) / 2) / (x1 - x0), (y - (y0 + y1) / 2) / (y1 - y0))

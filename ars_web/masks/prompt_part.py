@@ -63,7 +63,8 @@ class PromptPart:
     def of(self, image: UInt8[np.ndarray, "h w 3"]) -> UInt8[np.ndarray, "r c 3"]:
         """The part of a photograph."""
         window = image[self.y0 : self.y1, self.x0 : self.x1]
-        smooth = cv2.INTER_AREA if self.scale[0] <= 1 else cv2.INTER_LINEAR
+        # What is enlarged stays sharp: colours between the object's and those beside it would count as the object's.
+        smooth = cv2.INTER_AREA if self.scale[0] <= 1 else cv2.INTER_NEAREST
         return np.ascontiguousarray(cv2.resize(window, self.shape[::-1], interpolation=smooth))
 
     def of_mask(self, mask: Bool[np.ndarray, "h w"]) -> Bool[np.ndarray, "r c"]:

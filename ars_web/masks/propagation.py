@@ -38,6 +38,9 @@ POINTS = 25_000
 MOST_TRIED = 2_000_000
 """Points of the hull's box, of which those in the hull are taken; a hull much smaller than its box gets fewer."""
 
+FEWEST_POINTS = 100
+"""Fewer do not tell what an outline cuts away."""
+
 CUTS_LITTLE = 0.06
 """Beyond it an outline is certainly wrong; up to it a person is asked."""
 
@@ -128,6 +131,9 @@ def propagate(
     for frame in frames:
         camera, T = camera_of(taken, frame), taken.frames.Ts_world_camera[frame]
         outline = silhouette(camera, T, hull.vertices, hull.faces)
+        if not outline.intersects(shapely.box(0, 0, camera.width, camera.height)):
+            dropped[frame] = "its photograph does not show the object"
+            continue
         try:
             shots[frame] = _shot(frame, taken, read, outline, points, steps)
         except (BadFile, TooLarge) as error:
@@ -277,4 +283,9 @@ def _points_within(
         # Beyond the image's border an outline that touches it is open.
         inside[known] = ~within | shapely.contains_xy(area, shown[:, 0], shown[:, 1])
         points = points[inside]
+    if len(points) < FEWEST_POINTS:
+        raise BadInput(
+            "the outlines leave hardly anything that they both show: widen the masks, or outline the object once more"
+            " from another side"
+        )
     return points, spacing

@@ -82,3 +82,14 @@ def test_what_cannot_be_asked_is_refused_with_the_remedy(client, frames, body, t
 
 def test_a_frame_that_is_not_there_is_told(client, frames):
     assert client.post(f"{frames}/12/segment", json={"rectangle": [1, 1, 30, 30]}).status_code == 404
+
+
+def test_a_segmenter_of_ones_own_is_asked(run_server, tmp_path, ring_scene, painted_ring, tiny_network):
+    """The network finds what is red, and so leaves out the ball's orange middle, which GrabCut does not."""
+    painted_ring.write(ring_scene, tmp_path / "root" / "painted")
+    with run_server(tmp_path, segmenter=tiny_network.redness(tmp_path / "red.onnx")) as server:
+        body = {"name": "painted", "root": "data", "path": "painted", "classes": ["ball"]}
+        sid = server.client.post("/api/sessions", json=body).json()["id"]
+        truth = ring_scene.outline(2)
+        polygons = found(server.client.post(f"/api/sessions/{sid}/frames/2/segment", json={"rectangle": rough(truth)}))
+    assert iou(polygons, [Polygon(truth)]) > 0.9

@@ -1,6 +1,7 @@
-"""A segmenter of the user's own: tiny networks written here, as ONNX's format has them."""
+"""A segmenter of the user's own: tiny networks, as ONNX's format has them."""
 
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -9,62 +10,11 @@ from ars_web.errors import BadFile, BadInput
 from ars_web.masks.onnx_segmenter import DEVIATION, MEAN, OnnxSegmenter
 from ars_web.masks.segmenter import SegmentPrompt, Stroke
 
-FLOAT, FLOATS, INTS = 1, 6, 7
-
-
-def varint(value: int) -> bytes:
-    out = b""
-    while value > 0x7F:
-        out += bytes([value & 0x7F | 0x80])
-        value >>= 7
-    return out + bytes([value])
-
-
-def field(number: int, value: int | str | bytes) -> bytes:
-    """One field of a protocol buffer."""
-    if isinstance(value, int):
-        return varint(number << 3) + varint(value)
-    data = value.encode() if isinstance(value, str) else value
-    return varint(number << 3 | 2) + varint(len(data)) + data
-
-
-def tensor(name: str, values: np.ndarray) -> bytes:
-    dims = b"".join(field(1, size) for size in values.shape)
-    return dims + field(2, FLOAT) + field(8, name) + field(9, values.astype("<f4").tobytes())
-
-
-def value_info(name: str, shape: tuple[int, ...]) -> bytes:
-    dims = b"".join(field(1, field(1, size)) for size in shape)
-    return field(1, name) + field(2, field(1, field(1, FLOAT) + field(2, dims)))
-
-
-def node(kind: str, inputs: list[str], output: str, attributes: bytes = b"") -> bytes:
-    return (
-        b"".join(field(1, name) for name in inputs) + field(2, output) + field(3, output) + field(4, kind) + attributes
-    )
-
-
-def write(path: Path, *, weights: np.ndarray, bias: np.ndarray, channels: int = 3) -> Path:
-    """A network of one convolution and a sigmoid; the convolution's weights are (out, in, rows, columns)."""
-    kernel = field(1, "kernel_shape") + b"".join(field(8, size) for size in weights.shape[2:]) + field(20, INTS)
-    graph = (
-        field(1, node("Conv", ["photo", "weights", "bias"], "score", field(5, kernel)))
-        + field(1, node("Sigmoid", ["score"], "likely"))
-        + field(2, "tiny")
-        + field(5, tensor("weights", weights))
-        + field(5, tensor("bias", bias))
-        + field(11, value_info("photo", (1, channels, 320, 320)))
-        + field(12, value_info("likely", (1, len(weights), 320 - weights.shape[2] + 1, 320 - weights.shape[3] + 1)))
-    )
-    path.write_bytes(field(1, 7) + field(7, graph) + field(8, field(1, "") + field(2, 11)))
-    return path
-
 
 @pytest.fixture
-def redness(tmp_path: Path) -> Path:
+def redness(tmp_path: Path, tiny_network: ModuleType) -> Path:
     """A network that finds what is more than half red: RGB 0 to 1, put right for ImageNet's mean and deviation."""
-    weights = np.array([DEVIATION[0], 0.0, 0.0]).reshape(1, 3, 1, 1) * 50
-    return write(tmp_path / "red.onnx", weights=weights, bias=np.array([50 * (MEAN[0] - 0.5)]))
+    return tiny_network.redness(tmp_path / "red.onnx")
 
 
 def photograph() -> tuple[np.ndarray, np.ndarray]:
@@ -126,23 +76,23 @@ def test_a_file_that_is_no_network_is_refused(tmp_path):
         OnnxSegmenter(path)
 
 
-def test_a_network_that_takes_other_channels_is_refused(tmp_path):
-    path = write(tmp_path / "four.onnx", weights=np.ones((1, 4, 1, 1)), bias=np.zeros(1), channels=4)
+def test_a_network_that_takes_other_channels_is_refused(tmp_path, tiny_network):
+    path = tiny_network.write(tmp_path / "four.onnx", weights=np.ones((1, 4, 1, 1)), bias=np.zeros(1), channels=4)
     with pytest.raises(BadFile, match="does not take a 1 x 3 x 320 x 320 input"):
         OnnxSegmenter(path)
 
 
-def test_a_network_that_answers_more_than_one_mask_is_refused(tmp_path):
-    path = write(tmp_path / "two.onnx", weights=np.ones((2, 3, 1, 1)), bias=np.zeros(2))
+def test_a_network_that_answers_more_than_one_mask_is_refused(tmp_path, tiny_network):
+    path = tiny_network.write(tmp_path / "two.onnx", weights=np.ones((2, 3, 1, 1)), bias=np.zeros(2))
     with pytest.raises(BadFile, match=r"must be 1 x 1 x h x w, not \[1, 2, 320, 320\]"):
         OnnxSegmenter(path)
 
 
-def test_a_coarser_answer_is_brought_to_the_photographs_size(tmp_path):
+def test_a_coarser_answer_is_brought_to_the_photographs_size(tmp_path, tiny_network):
     """The mean over eleven by eleven pixels, so ten rows and columns fewer."""
     weights = np.zeros((1, 3, 11, 11))
     weights[0, 0] = DEVIATION[0] * 50 / 121
-    path = write(tmp_path / "mean.onnx", weights=weights, bias=np.array([50 * (MEAN[0] - 0.5)]))
+    path = tiny_network.write(tmp_path / "mean.onnx", weights=weights, bias=np.array([50 * (MEAN[0] - 0.5)]))
     image, truth = photograph()
     found = OnnxSegmenter(path).segment(image, SegmentPrompt(rectangle=RECTANGLE))
     assert (found & truth).sum() / (found | truth).sum() > 0.9

@@ -138,6 +138,17 @@ def test_drawn_outlines_that_do_not_meet_are_refused(painted):
         propagate(flat, painted.taken, read=painted.read)
 
 
+def test_outlines_that_leave_hardly_anything_are_refused_with_the_remedy(painted):
+    """Two strips a hundredth of a pixel wide meet in a thread that lies across the axes of the world."""
+    drawn = [painted.view(0), painted.view(4)]
+    thin = [
+        replace(view, polygons=tuple(replace(p, outer=(p.outer - middle) * (1, 1e-4) + middle) for p in view.polygons))
+        for view, middle in ((view, view.polygons[0].outer.mean(axis=0)) for view in drawn)
+    ]
+    with pytest.raises(BadInput, match="hardly anything that they both show: widen the masks"):
+        propagate(thin, painted.taken, read=painted.read)
+
+
 def test_no_other_frame_is_told_with_the_remedy(painted):
     frames = painted.taken.frames
     only = replace(
