@@ -15,10 +15,13 @@ from jaxtyping import Bool, Float
 
 from ars_web.errors import BadInput
 from ars_web.geometry import rigid_transform
-from ars_web.geometry.box import CORNER_SIGNS, Box, stack
+from ars_web.geometry.box import CORNER_SIGNS, LARGEST_SIZE, Box, stack
 from ars_web.geometry.box_parameters import PARAMETERS, STEP, BoxParameters, Orientation, upright_box, with_nearest_axes
 from ars_web.geometry.box_sighting import SightedBoxes, Sighting
 from ars_web.geometry.triangulation import Observation, triangulate
+
+SMALLEST_START, LARGEST_START = 1e-3, 1e3
+"""Metres, of the sizes that a search begins with."""
 
 MOST_STEPS = 60
 
@@ -98,6 +101,8 @@ def fit_box(start: Box, sightings: Sequence[Sighting], *, orientation: Orientati
     """
     _check(sightings)
     seen = SightedBoxes(sightings)
+    # Slivers have nowhere to grow from: sizes change by factors.
+    start = Box(start.T_world_box, np.clip(start.size, SMALLEST_START, LARGEST_START))
     first = upright_box(start) if orientation == "upright" else start
     starts = _starts(first, sightings, seen, orientation=orientation)
     fit = None
@@ -145,14 +150,14 @@ def _starts(first: Box, sightings: Sequence[Sighting], seen: SightedBoxes, *, or
         turns += [sign * tilt * axis for axis in np.eye(3)[:2] for sign in (-1.0, 1.0)]
     first_turned = [parameters.turned(turn) for turn in turns]
     candidates = list(first_turned)
-    first_turned += [Box(box.T_world_box, np.full(3, np.cbrt(np.prod(box.size)))) for box in first_turned]
+    first_turned += [Box(box.T_world_box, np.full(3, np.exp(np.log(box.size).mean()))) for box in first_turned]
     centre = _seen_centre(sightings)
     if centre is not None:
         moved = [_at(box, centre, scale=1.0) for box in first_turned]
         labels = seen.labelled(*stack(moved))
         ratio = seen.sizes / np.sqrt(np.prod(labels[..., 2:] - labels[..., :2], axis=-1))
         for box, scale in zip(moved, np.nanmedian(ratio, axis=1), strict=True):
-            if np.isfinite(scale) and 0.01 < scale < 100:
+            if np.isfinite(scale) and 1e-3 < scale < 1e3 and (box.size * scale <= LARGEST_SIZE).all():
                 candidates.append(_at(box, centre, scale=float(scale)))
     costs = np.median(np.abs(seen.misfits(*stack(candidates), by_outline=False)), axis=1)
     return [candidates[i] for i in np.argsort(costs, kind="stable")]

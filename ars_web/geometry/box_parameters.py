@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ars_web.geometry import rigid_transform
-from ars_web.geometry.box import Box
+from ars_web.geometry.box import FARTHEST, LARGEST_SIZE, Box
 
 Orientation = Literal["upright", "free"]
 
@@ -19,6 +19,9 @@ PARAMETERS: dict[Orientation, int] = {"upright": 7, "free": 9}
 STEP = 2e-3
 """Of the differences that slopes are taken from: parameters count in half diagonals, radians and shares of a size, so
 that a label moves by some tenths of a pixel, many times what it may be off."""
+
+SMALLEST_SIZE = 1e-6
+"""Metres, of a fitted box along any of its axes."""
 
 LARGEST_CHANGE = math.log(50)
 """Of a size, up or down, as a logarithm."""
@@ -51,6 +54,8 @@ class BoxParameters:
         R = rigid_transform.rotation_from_wxyz(wxyz)
         R = R @ T[:3, :3] if self.orientation == "upright" else T[:3, :3] @ R
         sizes = self.start.size * np.exp(np.clip(xs[:, -3:], -LARGEST_CHANGE, LARGEST_CHANGE))
+        # A search may go anywhere; what it finds is a box all the same.
+        places, sizes = np.clip(places, -FARTHEST, FARTHEST), np.clip(sizes, SMALLEST_SIZE, LARGEST_SIZE)
         return rigid_transform.from_rotation(R, places), sizes
 
     def box(self, x: Float[np.ndarray, "p"]) -> Box:

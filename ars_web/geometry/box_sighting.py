@@ -160,6 +160,8 @@ class SightedBoxes:
         known = np.isfinite(self._seen_between)
         for camera, all_rows in self._rows.items():
             rows = all_rows[known[all_rows].any(axis=1)]
+            if not len(rows):
+                continue
             wanted = np.ones((len(rows), b), dtype=bool)
             Ts = self._Ts_world_camera[rows]
             points, offsets = outlines_of_stacked(camera, Ts, Ts_world_box, sizes, wanted, tolerance=TOLERANCE)

@@ -145,6 +145,23 @@ def test_cameras_of_several_kinds_agree():
     np.testing.assert_allclose(fit.residuals_px[3], labels - seen[3].bbox, atol=0.05)
 
 
+def test_boxes_and_outlines_of_several_cameras_go_together():
+    random = np.random.default_rng(2)
+    Ts, box = round_about(4, random), thing(random)
+    seen = [*outlines_seen(BROWN, Ts[:3], box, random), boxes_seen(FISHEYE, Ts, box, random)[3]]
+    fit = fit_box(roughly(box, random), seen)
+    assert fit.by_outline
+    assert corners_off(fit, box) < 3e-3
+
+
+@pytest.mark.parametrize("size", [[1e-300, 0.07, 1e4], [1e-300] * 3])
+def test_a_start_of_any_size_will_do(size: list[float]):
+    random = np.random.default_rng(6)
+    Ts, box = round_about(4, random), thing(random)
+    start = Box(box.T_world_box, np.array(size))
+    assert corners_off(fit_box(start, outlines_seen(BROWN, Ts, box, random)), box) < 3e-3
+
+
 def test_the_axes_keep_their_names():
     random = np.random.default_rng(5)
     Ts, box = round_about(8, random), thing(random)
