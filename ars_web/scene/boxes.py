@@ -175,6 +175,8 @@ class BoxNodes:
         nodes.edges.colors = np.array(color, dtype=np.uint8)
         nodes.body.scale = size
         nodes.body.color = color
+        # It would hide the hull inside: both are sorted by their middles, which are one, and both write their depth.
+        nodes.body.visible = stored.hull is None
 
     def _make(self, box_id: int, color: tuple[int, int, int], size: tuple[float, float, float]) -> _Nodes:
         scene, at = self._server.scene, f"/boxes/{box_id}/at"

@@ -63,7 +63,7 @@ class HullNodes:
                 hull.faces.astype(np.uint32),
                 color=color,
                 opacity=OPACITY,
-                side="double",
+                side="front",
                 cast_shadow=False,
                 receive_shadow=False,
                 scale=(x, y, z),

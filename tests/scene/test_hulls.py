@@ -102,8 +102,10 @@ def test_another_hull_takes_its_place_and_undo_brings_the_first_back(
     shows(visitor, ball(2))
     editor.undo(sid, author="a")
     shows(visitor, ball())
+    assert visitor.nodes["/boxes/1/at/body"]["visible"] is False  # which would hide what is in it
     editor.undo(sid, author="a")
     visitor.listen_until(lambda v: v.nodes[HULL]["visible"] is False)
+    visitor.listen_until(lambda v: v.nodes["/boxes/1/at/body"]["visible"] is True)
     assert not [m for m in visitor.told if m["type"] == "RemoveSceneNodeMessage"]
 
 
