@@ -127,7 +127,7 @@ def _widest_baseline(cones: Sequence[ViewingCone]) -> float:
 
 def _beside(
     cone: ViewingCone, bounds: Float[np.ndarray, "n 3"], scene: ConeScene
-) -> tuple[Float[np.ndarray, "k 2"], ...] | None:
+) -> tuple[Float[np.ndarray, "_ 2"], ...] | None:
     """The rings of all of the normalised plane but an open cone's background, as far as the corners in the world of
     what the object is within reach there; None where they reach behind the camera, which no such rings can tell."""
     if not cone.depths(bounds).min() > scene.near:

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 
-def pixel_outlines(mask: Bool[np.ndarray, "h w"]) -> list[Float[np.ndarray, "k 2"]]:
+def pixel_outlines(mask: Bool[np.ndarray, "h w"]) -> list[Float[np.ndarray, "_ 2"]]:
     """The rings (k, 2) between a mask's inside and outside, image coordinates; their corners only.
 
     A lattice point is a corner where one or three of the four pixels round it are inside; it is two where two
@@ -42,7 +42,7 @@ def _partners(order: Int[np.ndarray, "n"]) -> Int[np.ndarray, "n"]:
     return partners
 
 
-def even_outlines(rings: Sequence[Float[np.ndarray, "k 2"]]) -> list[Float[np.ndarray, "m 2"]]:
+def even_outlines(rings: Sequence[Float[np.ndarray, "_ 2"]]) -> list[Float[np.ndarray, "_ 2"]]:
     """Rings of pixels' edges with every step of one pixel replaced by its middle, so that stairs become the line that
     they stand for; corners of longer edges, and ends that are one pixel wide, stay."""
     return [_even(ring) for ring in rings]

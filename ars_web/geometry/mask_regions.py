@@ -45,7 +45,7 @@ def region(polygons: Iterable[Polygon]) -> shapely.MultiPolygon:
     return _of_rings(rings)
 
 
-def _refuse_tangles(rings: Sequence[Float[np.ndarray, "k 2"]]) -> None:
+def _refuse_tangles(rings: Sequence[Float[np.ndarray, "_ 2"]]) -> None:
     """Clipper takes a minute over the pieces of a tangle of a thousand edges, or ends the process."""
     edges = [np.stack([ring, np.roll(ring, -1, axis=0)], axis=1) for ring in rings]
     lines = np.asarray(shapely.linestrings(np.concatenate(edges)))
@@ -64,7 +64,7 @@ def multipolygon(geometry: shapely.Geometry) -> shapely.MultiPolygon:
     return shapely.MultiPolygon([p for p in parts if isinstance(p, shapely.Polygon) and p.area > SMALLEST_AREA])
 
 
-def _of_rings(rings: Sequence[Float[np.ndarray, "k 2"]]) -> shapely.MultiPolygon:
+def _of_rings(rings: Sequence[Float[np.ndarray, "_ 2"]]) -> shapely.MultiPolygon:
     # Clipper counts windings of rings that cross themselves and each other, which GEOS takes as an error.
     pieces = CrossSection([np.ascontiguousarray(ring) for ring in rings], FillRule.EvenOdd).decompose()
     areas: list[shapely.Geometry] = []

@@ -19,7 +19,7 @@ class Polygon:
     """
 
     outer: Float[np.ndarray, "k 2"]
-    holes: tuple[Float[np.ndarray, "m 2"], ...] = ()
+    holes: tuple[Float[np.ndarray, "_ 2"], ...] = ()
 
     def __post_init__(self) -> None:
         """Raises BadInput for a ring of fewer than three corners, or one that is not finite."""
@@ -27,7 +27,7 @@ class Polygon:
         object.__setattr__(self, "holes", tuple(_ring(hole) for hole in self.holes))
 
     @property
-    def rings(self) -> tuple[Float[np.ndarray, "k 2"], ...]:
+    def rings(self) -> tuple[Float[np.ndarray, "_ 2"], ...]:
         """The outer ring, then the holes."""
         return (self.outer, *self.holes)
 

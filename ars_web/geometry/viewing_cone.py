@@ -59,7 +59,7 @@ class ViewingCone:
     is_open: bool
 
     @cached_property
-    def rings(self) -> tuple[Float[np.ndarray, "k 2"], ...]:
+    def rings(self) -> tuple[Float[np.ndarray, "_ 2"], ...]:
         """Those of `shown`, the outer ones counter-clockwise in (x, y) and holes clockwise."""
         return rings_of(self.shown)
 
@@ -94,7 +94,7 @@ class ViewingCone:
 
     def solid(
         self,
-        rings: Sequence[Float[np.ndarray, "k 2"]],
+        rings: Sequence[Float[np.ndarray, "_ 2"]],
         *,
         near: float,
         far: float,
@@ -215,7 +215,7 @@ def undistorted(camera: Camera, mask: shapely.MultiPolygon) -> shapely.MultiPoly
     return bent if bent.is_valid else _areas(shapely.make_valid(bent))
 
 
-def rings_of(region: shapely.Geometry) -> tuple[Float[np.ndarray, "k 2"], ...]:
+def rings_of(region: shapely.Geometry) -> tuple[Float[np.ndarray, "_ 2"], ...]:
     """The rings of a region's areas, outer ones counter-clockwise in (x, y) and holes clockwise."""
     oriented = [shapely.orient_polygons(part) for part in _areas(region).geoms]
     rings = [ring for part in oriented for ring in (part.exterior, *part.interiors)]

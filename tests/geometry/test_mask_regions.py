@@ -164,35 +164,35 @@ def test_iou_of_known_squares():
 
 def test_a_brush_adds_and_an_eraser_takes_away():
     square = (Polygon(SQUARE),)
-    bigger = combined(square, stroke(np.array([[5.0, 5.0], [15.0, 5.0]]), 4), "add")
+    bigger = combined(square, stroke(np.array([[5.0, 5.0], [15.0, 5.0]]), 4.0), "add")
     assert len(bigger) == 1
     assert bigger[0].outer[:, 0].max() == pytest.approx(17)
     # Through the middle: two halves are left.
-    halves = combined(square, stroke(np.array([[-5.0, 5.0], [15.0, 5.0]]), 4), "subtract")
+    halves = combined(square, stroke(np.array([[-5.0, 5.0], [15.0, 5.0]]), 4.0), "subtract")
     assert [region([half]).area for half in halves] == pytest.approx([30, 30])
     # A dab within is a hole.
-    (holed,) = combined(square, stroke(np.array([[5.0, 5.0]]), 4), "subtract")
+    (holed,) = combined(square, stroke(np.array([[5.0, 5.0]]), 4.0), "subtract")
     assert len(holed.holes) == 1
     assert combined(square, square, "subtract") == ()
 
 
 def test_a_stroke_is_as_wide_as_its_brush_and_round_at_its_ends():
-    (capsule,) = stroke(np.array([[10.0, 10.0], [30.0, 10.0]]), 6)
+    (capsule,) = stroke(np.array([[10.0, 10.0], [30.0, 10.0]]), 6.0)
     assert region([capsule]).bounds == pytest.approx((7, 7, 33, 13))
     assert region([capsule]).area == pytest.approx(20 * 6 + np.pi * 9, rel=0.01)
-    (disc,) = stroke(np.array([[10.0, 10.0]]), 6)
+    (disc,) = stroke(np.array([[10.0, 10.0]]), 6.0)
     assert region([disc]).area == pytest.approx(np.pi * 9, rel=0.01)
     # A brush that comes back to where it began leaves the middle free.
-    (loop,) = stroke(np.array([[0.0, 0.0], [40.0, 0.0], [40.0, 40.0], [0.0, 40.0], [0.0, 0.0]]), 6)
+    (loop,) = stroke(np.array([[0.0, 0.0], [40.0, 0.0], [40.0, 40.0], [0.0, 40.0], [0.0, 0.0]]), 6.0)
     assert len(loop.holes) == 1
     # Twice at one place is once.
-    assert region(stroke(np.array([[10.0, 10.0], [10.0, 10.0]]), 6)).area == pytest.approx(np.pi * 9, rel=0.01)
+    assert region(stroke(np.array([[10.0, 10.0], [10.0, 10.0]]), 6.0)).area == pytest.approx(np.pi * 9, rel=0.01)
 
 
 @pytest.mark.parametrize("points", [np.zeros((0, 2)), np.array([[np.nan, 1.0]]), np.array([[1.0, np.inf], [0, 0]])])
 def test_a_stroke_needs_points(points: np.ndarray):
     with pytest.raises(BadInput, match="a stroke needs points"):
-        stroke(points, 5)
+        stroke(points, 5.0)
 
 
 @pytest.mark.parametrize("width", [0.0, -3.0, np.nan, np.inf])
