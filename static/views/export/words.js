@@ -76,7 +76,9 @@ export function unit(option) {
 export function optionsWords(known, used, nameOf) {
   return known.flatMap((option) => {
     const value = option.name.split(".").reduce((/** @type {any} */ inner, key) => inner?.[key], used);
-    if (value === undefined || JSON.stringify(value) === JSON.stringify(option.default)) return [];
+    // Null, where it is none of the option's values, is what nobody chose: the default.
+    if (value === undefined || (value === null && !option.optional)) return [];
+    if (JSON.stringify(value) === JSON.stringify(option.default)) return [];
     return [`${option.title}: ${valueWords(option, value, nameOf)}`];
   });
 }
