@@ -24,6 +24,12 @@ Labels
     in the image. `truncated` is the share of the amodal outline's area outside the image; `visible` the share
     of the in-image outline that no nearer object hides.
 
+Hulls
+    A mask is polygons whose rings count by even and odd (`mask_regions`), in image coordinates of the original image.
+    The cone of a mask (`viewing_cone`) is open where the mask touches the border of what its camera sees: nothing is
+    known about what lies beyond. `visual_hull` intersects cones as closed meshes (`cone_intersection`), and where they
+    share nothing, `view_disagreement` says which outlines are at fault and by how many pixels.
+
 Speed
     Modules named `*_kernels.py` hold numba's compiled loops over frames and boxes, and nothing else; the module beside
     them says what they are for. Nothing is compiled on import, and what is compiled is kept on disk. Long rows of
