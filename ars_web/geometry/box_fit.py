@@ -23,7 +23,7 @@ from ars_web.geometry.triangulation import Observation, triangulate
 SMALLEST_START, LARGEST_START = 1e-3, 1e3
 """Metres, of the sizes that a search begins with."""
 
-MOST_STEPS = 60
+MOST_STEPS = 40
 
 PIXEL = 1.0
 """What a careful person's outline is off; the scale below which nothing is called doubtful."""
@@ -134,8 +134,11 @@ def _check(sightings: Sequence[Sighting]) -> None:
 
 @dataclass(frozen=True, eq=False)
 class _Solution:
+    """What one search led to; `typical` is the median of what is off, pixels."""
+
     box: Box
     cost: float
+    typical: float
     corner_error: float
     by_outline: bool
 
@@ -197,6 +200,8 @@ def _best(starts: Sequence[Box], seen: SightedBoxes, *, orientation: Orientation
         off = seen.misfits(*stack([found[-1].box]), by_outline=by_outline)
         if plenty and (math.sqrt(float(np.mean(off**2))) <= SETTLED * PIXEL or len(found) == ENOUGH_STARTS):
             break
+        if len(found) == ENOUGH_STARTS and min(one.typical for one in found) > WORST_FIT * float(seen.sizes.max()):
+            break  # what is seen is of no one object
     best = min(found, key=lambda solution: solution.cost)
     if not plenty:
         _check_one(best, found, seen)
@@ -270,7 +275,13 @@ def _solve(
     off = misfits(x)
     weights = np.minimum(1.0, scale / np.maximum(np.abs(off), 1e-9))
     cost = float(np.sum(np.where(weights < 1, 2 * scale * np.abs(off) - scale**2, off**2)))
-    return _Solution(parameters.box(x), cost, _corner_error(parameters, x, slopes(x), weights), by_outline)
+    return _Solution(
+        parameters.box(x),
+        cost,
+        float(np.median(np.abs(off))),
+        _corner_error(parameters, x, slopes(x), weights),
+        by_outline,
+    )
 
 
 def _corner_error(

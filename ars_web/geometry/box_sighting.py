@@ -18,7 +18,7 @@ AT_BORDER = 1.5
 SMALLEST = 2.0
 """Pixels. Of less than that, width or height, a box says nothing about a size."""
 
-TOLERANCE = 2e-3
+TOLERANCE = 5e-3
 """Pixels that a label may be off, so that the difference of two is a slope."""
 
 BETWEEN = np.array([[np.cos(a), np.sin(a)] for a in np.arange(16) * np.pi / 8 if round(a * 8 / np.pi) % 4])
