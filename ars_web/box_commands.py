@@ -94,9 +94,7 @@ def refine_box(
     box_id: Annotated[int, typer.Argument(metavar="BOX", help="The box's id.")],
     file: Annotated[
         Path | None,
-        typer.Argument(
-            metavar="[FILE]", help="JSON as POST boxes/BOX/refine takes it; - for stdin; default: its masks."
-        ),
+        typer.Argument(metavar="FILE", help="JSON as POST boxes/BOX/refine takes it; - for stdin; default: its masks."),
     ] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say how the box would fit, and leave it.")] = False,
     sessions: take.Sessions = take.SESSIONS,
