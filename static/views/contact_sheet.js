@@ -5,7 +5,7 @@ import { Icon } from "../lib/icon.js";
 import { niceStep, niceSteps } from "../lib/nice_step.js";
 import { useScrollPlace } from "../lib/scroll_place.js";
 import { html, useEffect, useLayoutEffect, useMemo, useRef, useState } from "../lib/view.js";
-import { actions, frame, frames, overlay, selectedBox, shownBoxes } from "../store.js";
+import { actions, frame, frames, mode, overlay, selectedBox, shownBoxes } from "../store.js";
 import { ContactLabels } from "./contact_labels.js";
 import { ContactTile } from "./contact_tile.js";
 
@@ -96,7 +96,9 @@ export function ContactSheet() {
   /** @param {number} index */
   const enter = (index) => {
     overlay.value = null;
-    actions.enterFrame(index);
+    // Whoever outlines wants the frame beside the others, not to leave them.
+    if (mode.peek() === "masks") actions.goTo(index);
+    else actions.enterFrame(index);
   };
   /** @param {number} next */
   const changeStep = (next) => {

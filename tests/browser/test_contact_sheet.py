@@ -168,3 +168,16 @@ def test_only_what_is_in_sight_exists(boxed_session, open_flatly, viewport) -> N
         page.wait_for_function("() => document.querySelectorAll('.tile').length < 9")
         expect(page.get_by_role("dialog").get_by_role("listitem").first).to_have_attribute("aria-setsize", "9")
         assert page.get_by_role("dialog").evaluate("sheet => sheet.scrollWidth <= sheet.clientWidth")
+
+
+def test_a_frame_chosen_while_outlining_is_shown_beside_the_others(boxed_session, open_flatly) -> None:
+    with open_flatly(*boxed_session, **SMALL) as workspace:
+        page = workspace.page
+        page.keyboard.press("3")
+        panes = page.get_by_role("region", name=re.compile(r"^Frame \d+"))
+        expect(panes).to_have_count(2)
+        page.keyboard.press("c")
+        tile(page, 7).click()
+        expect(page.get_by_role("dialog", name="Contact sheet")).to_have_count(0)
+        expect(panes).to_have_count(2)
+        expect(page.get_by_role("button", name="Frame 7", exact=True).first).to_be_visible()
