@@ -15,6 +15,17 @@ import { place, refused } from "./saving.js";
 /** @type {Record<import("../../store.js").MaskOrigin, string>} */
 const ORIGINS = { drawn: "polygon", smart: "smart tool", proposed: "outlined" };
 
+/** What is done with each tool. @type {Record<import("./drawing.js").ToolName, string>} */
+const HOW = {
+  select: "take the polygon, or another tool, at the left",
+  polygon: "click round it, and close at the first point",
+  lasso: "drag round it",
+  rectangle: "drag from one corner of it to the other",
+  brush: "paint over it",
+  eraser: "take the polygon, or another tool, at the left",
+  smart: "drag a rectangle round it",
+};
+
 /** @param {{subject: import("./subject.js").Subject}} props */
 export function MasksList({ subject }) {
   const problem = store.problems.value.get("masks");
@@ -40,7 +51,7 @@ export function MasksList({ subject }) {
         title="One more frame beside these: the one that narrows the hull most"
       >Add view</button>
     </header>
-    ${rows.length === 0 && html`<p class="muted">No masks yet. Outline the object in both frames: click round it, and close at the first point.</p>`}
+    ${rows.length === 0 && html`<p class="muted">No masks yet. Outline the object in both frames: ${HOW[drawing.tool.value]}.</p>`}
     ${rows.length > 0 &&
     html`<ul class="masks-list">
       ${rows.map((row) => html`<${Row} key=${row.frame} ...${row} color=${subject.color} refusal=${refused.value.get(place(subject.key, row.frame))} tried=${tried} />`)}

@@ -51,6 +51,11 @@ export function OutlineRestButton({ subject }) {
   >Outline the rest</button>`;
 }
 
+/** What has come of it may lie below a long list of masks. @param {HTMLElement | null} told */
+function intoSight(told) {
+  told?.scrollIntoView({ block: "nearest" });
+}
+
 /** @param {{job: Job | {problem: string} | undefined, id: number | null}} props */
 export function OutlineRest({ job, id }) {
   if (job === undefined || id === null) return null;
@@ -72,7 +77,7 @@ export function OutlineRest({ job, id }) {
     ...(job.doubtful.length > 0 ? [`${job.doubtful.length} to look at`] : []),
     ...(job.dropped.length > 0 ? [`${job.dropped.length} dropped`] : []),
   ];
-  return html`<div class="outline-job">
+  return html`<div class="outline-job" ref=${intoSight}>
     <p class="row"><span role="status">${words.join(", ")}.</span>${dismiss}</p>
     <${Reasons} words="Why some are to be looked at" reasons=${job.doubts} />
     <${Reasons} words="Why some were dropped" reasons=${job.dropped} />

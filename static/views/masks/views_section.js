@@ -29,7 +29,7 @@ export function Views({ subject }) {
       <div><dt>Hull so far</dt><dd title=${told?.hull ? `${volumeText(told.hull.volume)}` : undefined}>${hullText(told)}</dd></div>
       <div><dt>Best next view</dt><dd>
         ${next === null
-          ? html`<span class="muted">${told?.problem ? "once the views agree" : views.value.length === 0 ? "after the first mask" : "none is better"}</span>`
+          ? html`<span class="muted">${told?.problem ? (isDisagreement(told.problem) ? "once the views agree" : "see below") : views.value.length === 0 ? "after the first mask" : "none is better"}</span>`
           : html`<button class="button link" title=${next.reason} onClick=${() => openView(next.frame)}>Frame ${next.frame}</button>`}
       </dd></div>
     </dl>
@@ -51,7 +51,12 @@ export function Views({ subject }) {
 /** @param {import("./guidance.js").HullPreview | null} told */
 function hullText(told) {
   if (told?.hull) return sizeText(told.hull.size);
-  return html`<span class="muted">${told?.problem ? "none: the views disagree" : "needs two masks"}</span>`;
+  return html`<span class="muted">${told?.problem ? (isDisagreement(told.problem) ? "none: the views disagree" : "none: see below") : "needs two masks"}</span>`;
+}
+
+/** Whether it is known how far one of them misses the others; else they may see too little, which the words below say. @param {{views: readonly {misfit_px: number | null}[]}} problem */
+function isDisagreement({ views }) {
+  return views.some(({ misfit_px }) => misfit_px !== null);
 }
 
 /** @param {number} volume cubic metres */
