@@ -63,6 +63,8 @@ export class MaskEditor {
   #pane;
   #zoom = 1;
   #aimed = false;
+  /** Whether the point that was pressed last is not there any more. */
+  #isGone = () => false;
   /** Shapes that the server is joining to a mask. @type {Set<{sheet: MaskSheet, shape: Shape, operation: Operation}>} */
   #pending = new Set();
   /** What is to be joined to a mask waits for what comes before it. @type {WeakMap<MaskSheet, Promise<unknown>>} */
@@ -133,16 +135,23 @@ export class MaskEditor {
     this.#pane = new ImagePane(
       element,
       {
-        onPress: (at, event) => (this.#look.locked ? null : (this.#begin(), this.#tool.press(at, event))),
+        onPress: (at, event) => this.#press(at, event),
         onClick: (at, event) => this.#click(at, event),
         onDoubleClick: () => !this.#look.locked && this.#tool.doubleClick(),
         onHover: (at, by) => {
           this.#aimed ||= by === "keys" && at !== null;
           this.#tool.hover(at, by);
         },
-        onChoosePoint: (id) => corners.owns(id) && corners.choose(id),
+        onChoosePoint: (id) => {
+          this.#isGone = this.#watchReplaced();
+          if (corners.owns(id)) corners.choose(id);
+        },
         onClickPoint: (id) => ring.owns(id) && ring.clicked(id),
-        onMovePoint: (id, to, phase) => (ring.owns(id) ? ring.moved(id, to) : corners.owns(id) && corners.move(id, to, phase)),
+        onMovePoint: (id, to, phase) => {
+          if (this.#isGone()) return;
+          if (ring.owns(id)) ring.moved(id, to);
+          else if (corners.owns(id)) corners.move(id, to, phase);
+        },
         onStepPoint: (id, to) => corners.owns(id) && corners.step(id, to),
         onView: (view) => {
           this.#zoom = view.zoom;
@@ -248,6 +257,27 @@ export class MaskEditor {
 
   get #tool() {
     return this.#tools[this.#host.tool.peek()];
+  }
+
+  /** @returns {() => boolean} whether what was on the sheet is another's by then, or the sheet is another */
+  #watchReplaced() {
+    const sheet = this.#sheet;
+    const replaced = sheet.replaced.peek();
+    return () => sheet !== this.#sheet || replaced !== sheet.replaced.peek();
+  }
+
+  /** @param {Place} at @param {PointerEvent} event @returns {import("./pane_gestures.js").Drag | null} */
+  #press(at, event) {
+    if (this.#look.locked) return null;
+    this.#begin();
+    const isGone = this.#watchReplaced();
+    const drag = this.#tool.press(at, event);
+    if (drag === null) return null;
+    return {
+      move: (to) => (isGone() ? drag.cancel() : drag.move(to)),
+      end: (to) => (isGone() ? drag.cancel() : drag.end(to)),
+      cancel: () => drag.cancel(),
+    };
   }
 
   /** @param {Place} at @param {import("./image_pane.js").Modifiers} event */

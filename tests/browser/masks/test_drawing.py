@@ -137,12 +137,17 @@ def test_a_polygon_is_clicked_and_mended(drawing: Drawing) -> None:
     # What another person draws takes its place, and cannot be undone here.
     (mask,) = drawing.workspace.answer("/masks")
     other = {"outer": [[20, 20], [60, 20], [60, 60]], "holes": []}
+    page.mouse.move(*drawing.at(*SQUARE[2]))
+    page.mouse.down()
+    page.mouse.move(*drawing.at(220, 220), steps=3)
     path = f"/api/sessions/{drawing.workspace.sid}/masks/{mask['id']}"
     headers = {"If-Match": f'"{mask["revision"]}"'}
     answer = drawing.workspace.client.put(path, json={"polygons": [other]}, headers=headers)
     assert answer.status_code == 200, answer.text
     expect(page.get_by_text(re.compile("3 points"))).to_be_visible()
     expect(drawing.pane.get_by_role("button", name="Undo in this outline")).to_have_count(0)
+    page.mouse.move(*drawing.at(230, 230), steps=3)
+    page.mouse.up()  # a drag that was under way ends with what it dragged
     page.keyboard.press("v")
     drawing.drag((50, 30), (80, 40))
     assert drawing.ring(13) == pytest.approx(np.array([(50, 30), (90, 30), (90, 70)]), **near)
