@@ -2111,6 +2111,11 @@ export interface components {
              * @description z in the world, metres, of a support plane under the object; null: none
              */
             ground: number | null;
+            /**
+             * Fitted
+             * @description whether the box was fitted to what is seen since: it stays, the hull alone follows the masks
+             */
+            fitted: boolean;
         };
         /**
          * HullPreviewAnswer

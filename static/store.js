@@ -19,7 +19,7 @@ import { computed, signal } from "./lib/view.js";
 /** An object's outline in one frame. Its box may not be made yet. @typedef {Schemas["MaskAnswer"]} Mask */
 /** @typedef {Mask["origin"]} MaskOrigin */
 
-/** How a hull is made of masks. @typedef {Omit<Schemas["HullOptionsJson"], "position">} HullOptions */
+/** How a hull is made of masks. @typedef {Omit<Schemas["HullOptionsJson"], "position" | "fitted"> & {fitted?: boolean}} HullOptions */
 /** @typedef {{frame: number, polygons: readonly Polygon[]}} MaskView */
 /** What an object looks like in one frame, as far as a person has said. @typedef {{rectangle?: [number, number, number, number], inside?: Corner[][], outside?: Corner[][], brush_width?: number, start?: Polygon[]}} SegmentPrompt */
 

@@ -96,6 +96,8 @@ class HullChangeJson(Strict):
             position=self.position or before.position,
             widen=before.widen if self.widen_px is None else self.widen_px,
             ground=self.ground if "ground" in self.model_fields_set else before.ground,
+            # Who says how the box is to lie wants it made anew.
+            fitted=before.fitted and self.orientation is None and self.position is None,
         )
 
 

@@ -80,7 +80,8 @@ class BoxFitting:
         key: str | None = None,
         request: object = None,
     ) -> FittedBox:
-        """Fit a box, in one edit. Its hull stays where it is in the world.
+        """Fit a box, in one edit. Its hull stays where it is in the world, and the box where it was fitted to when the
+        masks change.
 
         A repeat with the same idempotency `key` and the same `request` (strings, numbers, lists and dicts of them) is
         worked out again from what the box was, and changes nothing.
@@ -103,7 +104,7 @@ class BoxFitting:
             class_id=before.class_id,
             box=fitted.box.box,
             hull=hull,
-            hull_options=before.hull_options,
+            hull_options=None if before.hull_options is None else replace(before.hull_options, fitted=True),
             expected_revision=expected_revision,
             summary=f"Fit {before.name} to {len(fitted.frames)} frames",
             author=author,

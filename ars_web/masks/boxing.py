@@ -276,7 +276,8 @@ class ObjectBoxes:
                 " in another frame first, or delete the box"
             )
         options = options or (None if before is None else before.hull_options) or HullOptions()
-        box, hull = object_of(views_of(photographs(self._store, sid), sorted(outlines.items())), options)
+        views = views_of(photographs(self._store, sid), sorted(outlines.items()))
+        box, hull = object_of(views, options, before=None if before is None else before.box)
         return self._editor.put_object(
             sid,
             box_id=box_id,

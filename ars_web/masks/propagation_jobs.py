@@ -295,7 +295,7 @@ class OutlineJobs:
             return begun.box.box, None if stored is None else self._store.hull(order.sid, stored)
         outlines = {mask.frame: mask.polygons for mask in (*begun.accepted, *accepted)}
         views = views_of(photographs(self._store, order.sid), sorted(outlines.items()))
-        return object_of(views, begun.options)
+        return object_of(views, begun.options, before=None if begun.box is None else begun.box.box)
 
     def _change(self, job_id: str, *, settled: bool = False, **changes: Any) -> None:
         """Change a job, or raise Cancelled where it is not to go on."""

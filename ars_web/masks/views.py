@@ -76,14 +76,15 @@ def views_of(taken: Photographed, outlines: Outlines) -> tuple[View, ...]:
     return tuple(views.values())
 
 
-def object_of(views: Sequence[View], options: HullOptions) -> tuple[Box, HullMesh]:
-    """The box and the hull that outlines give.
+def object_of(views: Sequence[View], options: HullOptions, *, before: Box | None = None) -> tuple[Box, HullMesh]:
+    """The box and the hull that outlines give; the box as it was `before` where it was fitted.
 
     Raises:
         ViewsDisagree: they are of no one object, or too few or too much alike to tell.
     """
     hull = visual_hull(views, widen=options.widen, ground=options.ground)
-    box = box_of_hull(hull, orientation=options.orientation, position=options.position)
+    kept = before if options.fitted else None
+    box = kept or box_of_hull(hull, orientation=options.orientation, position=options.position)
     return box, HullMesh.of(hull.vertices, hull.faces, box)
 
 

@@ -87,6 +87,9 @@ class HullOptionsJson(_Strict):
     ground: Annotated[float, Field(strict=True, ge=-FARTHEST, le=FARTHEST)] | None = Field(
         description="z in the world, metres, of a support plane under the object; null: none"
     )
+    fitted: bool = Field(
+        description="whether the box was fitted to what is seen since: it stays, the hull alone follows the masks"
+    )
 
 
 class BoxFileItem(BoxJson):

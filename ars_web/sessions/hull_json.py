@@ -16,6 +16,7 @@ def options_json(options: HullOptions) -> dict[str, Any]:
         "position": options.position,
         "widen_px": options.widen,
         "ground": options.ground,
+        "fitted": options.fitted,
     }
 
 
@@ -28,7 +29,9 @@ def options_from_json(item: Any) -> HullOptions:
     if not isinstance(item, dict):
         raise BadInput(f"a hull's options must be an object, not {item!r}")
     values = cast(dict[str, Any], item)
-    return HullOptions(values["orientation"], values["position"], values["widen_px"], values["ground"])
+    return HullOptions(
+        values["orientation"], values["position"], values["widen_px"], values["ground"], bool(values["fitted"])
+    )
 
 
 def digest_from_json(text: Any) -> str:

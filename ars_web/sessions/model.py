@@ -67,12 +67,15 @@ class HullOptions:
         position: what the box's centre is: its own, or the hull's centre of mass.
         widen: pixels that every mask is widened by, for poses that are a little off.
         ground: z in the world, metres, of a support plane under the object; None: there is none.
+        fitted: whether the box was fitted to what is seen of the object since: it then stays as it is, and the hull
+            alone follows the masks.
     """
 
     orientation: Orientation = "world"
     position: Position = "box"
     widen: float = 0.0
     ground: float | None = None
+    fitted: bool = False
 
     def __post_init__(self) -> None:
         """Raises BadInput for what none of them can be."""

@@ -113,11 +113,41 @@ def test_a_box_made_from_masks_is_fitted_to_them_and_keeps_its_hull_in_place(
     # The box that labels a ball rightly is smaller than the one round it.
     assert np.prod(found["box"]["size"]) < 0.8 * np.prod(made["size"])
     assert found["box"]["has_hull"]
-    assert found["box"]["hull_options"] == made["hull_options"]
+    assert found["box"]["hull_options"] == {**made["hull_options"], "fitted": True}
     assert any("does not fill a box" in warning for warning in found["warnings"])
     after = client.get(f"{path}/hull").json()
     np.testing.assert_allclose(after["vertices"], before["vertices"], atol=1e-7)
     assert after["faces"] == before["faces"]
+
+
+def test_a_fitted_box_stays_when_its_masks_change_and_its_hull_follows(
+    client: httpx.Client, ring: str, ring_scene
+) -> None:
+    outlines = [{"frame": frame, "polygons": ring_scene.polygons(frame)} for frame in (0, 2, 5, 7, 9)]
+    made = client.post(f"{ring}/boxes/from-masks", json={"class_id": 0, "views": outlines}).json()
+    path = f"{ring}/boxes/{made['id']}"
+    fitted = refine(client, ring, made, {"orientation": "upright"}).json()["box"]
+    hull = client.get(f"{path}/hull").json()
+    mask = next(mask for mask in client.get(f"{ring}/masks").json() if mask["frame"] == 5)
+    smaller = ring_scene.polygons(5)
+    middle = np.mean(smaller[0]["outer"], axis=0)
+    smaller[0]["outer"] = (middle + 0.8 * (np.array(smaller[0]["outer"]) - middle)).tolist()
+    tag = {"If-Match": f'"{mask["revision"]}"'}
+    assert client.put(f"{ring}/masks/{mask['id']}", json={"polygons": smaller}, headers=tag).status_code == 200
+    kept = client.get(path).json()
+    assert (kept["T_world_box"], kept["size"]) == (fitted["T_world_box"], fitted["size"])
+    assert client.get(f"{path}/hull").json()["volume"] < 0.95 * hull["volume"]
+
+    def make(body: dict[str, Any]) -> dict[str, Any]:
+        tag = {"If-Match": f'"{client.get(path).json()["revision"]}"'}
+        answer = client.put(f"{path}/hull", json=body, headers=tag)
+        assert answer.status_code == 200, answer.text
+        return client.get(path).json()
+
+    assert make({"widen_px": 1.0})["size"] == fitted["size"]
+    anew = make({"orientation": "world"})
+    assert anew["hull_options"] == {**made["hull_options"], "widen_px": 1.0}
+    assert np.prod(anew["size"]) > np.prod(fitted["size"])
 
 
 def test_masks_and_pictures_of_masks_may_be_given(client: httpx.Client, ring: str, rough, ring_scene) -> None:

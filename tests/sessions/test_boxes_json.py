@@ -79,7 +79,7 @@ def test_a_files_boxes_are_what_the_api_answers(
     )  # fmt: skip
     listed = [box_json(box) for box in store.state(sid).boxes.values()]
     assert (listed[2]["has_hull"], listed[2]["hull_options"]) == (
-        True, {"orientation": "free", "position": "box", "widen_px": 1.5, "ground": None},
+        True, {"orientation": "free", "position": "box", "widen_px": 1.5, "ground": None, "fitted": False},
     )  # fmt: skip
     (tmp_path / "boxes.json").write_text(json.dumps(listed))
     drafts = read_boxes_file(tmp_path / "boxes.json")

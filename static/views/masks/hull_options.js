@@ -23,14 +23,14 @@ const ORIENTATIONS = /** @type {const} */ ([
 async function change(subject, changes) {
   const now = made(subject.box);
   if (now === undefined || subject.id === null) wish(changes);
-  else await store.actions.makeHull(subject.id, { ...options.value, ...changes });
+  else await store.actions.makeHull(subject.id, changes);
 }
 
 /** @param {{subject: Subject}} props */
 export function HullOptions({ subject }) {
   const problem = useSignal(/** @type {string | null} */ (null));
   const locked = subject.box?.locked ?? false;
-  const { orientation, widen_px } = options.value;
+  const { orientation, widen_px, fitted } = options.value;
   return html`<section class="panel-section hull-options" aria-label="How the box is made">
     <${InlineField}
       label="Expected mask error" shown=${`${trimmed(widen_px, 0, 2)} px`} edited=${trimmed(widen_px, 0, 2)} locked=${locked}
@@ -41,7 +41,7 @@ export function HullOptions({ subject }) {
       <div class="joined" role="group" aria-label="Box axes">
         ${ORIENTATIONS.map(
           ([name, words, title]) => html`<button
-            key=${name} class="button small" aria-pressed=${orientation === name} title=${title} disabled=${locked}
+            key=${name} class="button small" aria-pressed=${!fitted && orientation === name} title=${title} disabled=${locked}
             onClick=${() =>
               change(subject, { orientation: name }).then(
                 () => (problem.value = null),
@@ -51,6 +51,7 @@ export function HullOptions({ subject }) {
         )}
       </div>
     </div>
+    ${fitted && html`<p class="muted">The box stays as it was fitted, and the hull follows the masks. Choose axes to make it of the hull again.</p>`}
     ${problem.value !== null && html`<p class="problem" role="alert">${problem.value}</p>`}
   </section>`;
 }
