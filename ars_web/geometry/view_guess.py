@@ -18,9 +18,9 @@ from ars_web.geometry.visual_hull import View, VisualHull
 SMALLEST_DIAMETER = 24.0
 """Pixels. What is smaller in an image cannot be drawn well."""
 
-DEPTHS = 16
+DEPTHS = 32
 """Of an object that is drawn in one frame only: how far it may be, between a twentieth of the camera path's extent and
-twice that, in even shares."""
+six times that, in even shares. Whoever holds a camera before a table moves it by less than the table is away."""
 
 POINTED = 8
 """How sharply it counts that cameras point at a guess: cameras are pointed at what is recorded. On the cell's ten
@@ -86,7 +86,7 @@ def guesses_of_view(view: View, frames: FrameRows) -> list[Guess]:
     extent = 2 * float(np.median(np.linalg.norm(centres - np.median(centres, axis=0), axis=1)))
     rows = evenly(np.arange(len(frames)), PROBED)
     found: list[Guess] = []
-    for depth in extent * np.geomspace(1 / 20, 2, DEPTHS):
+    for depth in extent * np.geomspace(1 / 20, 6, DEPTHS):
         place = cone.centre_world + cone.middle_world * (depth / along_axis)
         guess = Guess(place, float(depth * math.sqrt(np.prod(sides)) / 2))
         pointed = float((shows(frames, rows, guess) * pointed_at(frames, rows, place)).mean())

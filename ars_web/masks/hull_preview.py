@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 import shapely
 
-from ars_web.errors import BadInput
+from ars_web.errors import BadInput, ViewsDisagree
 from ars_web.geometry.box import Box
 from ars_web.geometry.camera import Camera, normalised_from_pixels, pixels_from_image
 from ars_web.geometry.hull_box import box_of_hull
@@ -62,7 +62,8 @@ class HullPreview:
         hull, box: None where there are fewer than two views, or they give none.
         angle: radians between the two views that are farthest apart; None where there is no hull.
         problem: why there is none, of two views or more; ViewsDisagree where it is that.
-        next_view: the frame to draw next; None where none would do more, or the views disagree.
+        next_view: the frame to draw next; None where none would do more, or the views disagree. Where they are too much
+            alike to tell anything, it is the best one beside the first.
         warnings: what is uncertain and what to do about it, in words.
     """
 
@@ -91,7 +92,7 @@ def preview_hull(
         angle=angle,
         overlays=_overlays(taken, views, options, hull, show_in),
         problem=problem,
-        next_view=None if problem is not None else _next_view(taken, views, hull),
+        next_view=_next_view(taken, views, hull) if problem is None or _tells_nothing(problem) else None,
         warnings=() if angle is None or angle >= SMALL_ANGLE else (_one_sided(angle),),
     )
 
@@ -163,6 +164,11 @@ def _next_view(taken: Photographed, views: Sequence[View], hull: VisualHull | No
         return None  # no other frame shows what is drawn
     found = suggest_views(guesses, [view.frame for view in views], rows)
     return found[0] if found else None
+
+
+def _tells_nothing(problem: BadInput) -> bool:
+    """Whether the views are not said to be wrong, only too much alike."""
+    return isinstance(problem, ViewsDisagree) and all(math.isnan(pixels) for _, pixels in problem.misfits)
 
 
 def _one_sided(angle: float) -> str:

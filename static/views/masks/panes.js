@@ -2,13 +2,13 @@
 
 import { batch, signal } from "../../lib/view.js";
 import * as store from "../../store.js";
-import { partnerOf } from "../points/partner_frame.js";
 
 /** @typedef {{id: number, frame: number}} Pane `id`: the pane stays the same while its frame changes */
 
 export const MOST = 4;
-/** Degrees between views of which a hull is tight. */
-const ANGLES = { least: 60, most: 120, best: 90 };
+/** Of the image's sides: what is taken for the object while nothing is outlined. */
+const MIDDLE = 0.25;
+const PLAIN = /** @type {const} */ ({ orientation: "world", widen_px: 0, ground: null });
 
 export const panes = signal(/** @type {readonly Pane[]} */ ([]));
 /** The pane that the film strip and the keys are for, by its place. */
@@ -72,11 +72,23 @@ async function addPartner(beside) {
   const count = store.frames.peek();
   if (count < 2) return;
   searching.value = true;
-  const { width, height } = await store.actions.cameraOf(beside).catch(() => ({ width: 0, height: 0 })); // the page says that nobody answers
-  const found = width === 0 ? null : await partnerOf({ frame: beside, x: width / 2, y: height / 2 }, count, { mustShow: false, angles: ANGLES });
+  const found = await partnerOf(beside);
   if (mine !== search) return;
   searching.value = false;
-  if (panes.value.length === 1) panes.value = [...panes.value, pane(found?.frame ?? (beside + Math.ceil(count / 2)) % count)];
+  if (panes.value.length === 1) panes.value = [...panes.value, pane(found ?? (beside + Math.ceil(count / 2)) % count)];
+}
+
+/** The frame that the server would outline next if the middle of `beside` were the object. @param {number} beside @returns {Promise<number | null>} */
+async function partnerOf(beside) {
+  try {
+    const { width, height } = await store.actions.cameraOf(beside);
+    const [x0, y0] = [(width * (1 - MIDDLE)) / 2, (height * (1 - MIDDLE)) / 2];
+    const outer = /** @type {[number, number][]} */ ([[x0, y0], [width - x0, y0], [width - x0, height - y0], [x0, height - y0]]);
+    const { next_view } = await store.actions.previewHull([{ frame: beside, polygons: [{ outer, holes: [] }] }], PLAIN, []);
+    return next_view?.frame ?? null;
+  } catch {
+    return null; // the page says elsewhere that nobody answers
+  }
 }
 
 export function leave() {

@@ -2,10 +2,10 @@
 
 import { actions } from "../../store.js";
 
-/** Degrees between two views. @typedef {{least: number, most: number, best: number}} Angles */
-
-/** Those at which a point's distance is well known and the same corner still seen. @type {Angles} */
-const CORNERS = { least: 20, most: 60, best: 40 };
+/** Degrees between the views at which a point's distance is well known and the same corner still seen. */
+const LEAST = 20;
+const MOST = 60;
+const BEST = 40;
 /** Frames that are looked at, spread over the recording. */
 const CANDIDATES = 24;
 /** Requests under way at once. */
@@ -16,17 +16,16 @@ const TOGETHER = 4;
 /** @typedef {{frame: number, degrees: number | null}} Partner degrees between the views; null: not known */
 
 /**
- * The frame that makes a good pair with what is seen at a place: 20 to 60 degrees apart, or at other angles that are asked
- * for, and looking at the same thing.
+ * The frame that makes a good pair with what is seen at a place: 20 to 60 degrees apart, and looking at the same thing.
  *
  * The server says the angle between two views of a point; here the point is the one nearest to the line of sight from
  * the one frame and to the middle of the other, so that the angle is about right where the middle shows the object.
  * @param {Sighting} seen
  * @param {number} count frames of the recording
- * @param {{mustShow: boolean, angles?: Angles}} options `mustShow`: the point is known, and the frame must show where it can be
+ * @param {{mustShow: boolean}} options `mustShow`: the point is known, and the frame must show where it can be
  * @returns {Promise<Partner | null>} null: there is no other frame
  */
-export async function partnerOf(seen, count, { mustShow, angles = CORNERS }) {
+export async function partnerOf(seen, count, { mustShow }) {
   const found = /** @type {Candidate[]} */ ([]);
   const waiting = candidatesOf(seen.frame, count);
   if (waiting.length === 0) return null;
@@ -37,7 +36,7 @@ export async function partnerOf(seen, count, { mustShow, angles = CORNERS }) {
     }
   };
   await Promise.all(Array.from({ length: TOGETHER }, work));
-  found.sort((a, b) => cost(a, angles) - cost(b, angles));
+  found.sort((a, b) => cost(a) - cost(b));
   for (const { frame, degrees } of found) {
     if (!mustShow || (await shows(seen, frame))) return { frame, degrees };
   }
@@ -46,7 +45,7 @@ export async function partnerOf(seen, count, { mustShow, angles = CORNERS }) {
 
 /** Whether an angle is one at which corners are found well. @param {number} degrees */
 export function isGoodAngle(degrees) {
-  return degrees >= CORNERS.least && degrees <= CORNERS.most;
+  return degrees >= LEAST && degrees <= MOST;
 }
 
 /** @param {number} frame @param {number} count */
@@ -67,10 +66,10 @@ async function looked(seen, frame) {
   }
 }
 
-/** @param {Candidate} candidate @param {Angles} angles */
-function cost({ degrees, px }, { least, most, best }) {
-  const off = Math.max(least - degrees, degrees - most, 0);
-  return (off > 0 ? 10 + off : 0) + px + Math.abs(degrees - best) / 200;
+/** @param {Candidate} candidate */
+function cost({ degrees, px }) {
+  const off = Math.max(LEAST - degrees, degrees - MOST, 0);
+  return (off > 0 ? 10 + off : 0) + px + Math.abs(degrees - BEST) / 200;
 }
 
 /** @param {Sighting} seen @param {number} frame */
