@@ -9,6 +9,8 @@ import pytest
 
 BALL = 4 / 3 * math.pi * 0.04**3
 
+USUAL = {"orientation": "world", "position": "box", "widen_px": 0, "ground": None, "fitted": False}
+
 
 @pytest.fixture
 def wanted(ring_scene):
@@ -38,7 +40,7 @@ def test_outlines_give_the_box_its_hull_and_masks_in_one_edit(client: httpx.Clie
     assert answer.headers["location"] == f"{ring}/boxes/{box['id']}"
     assert answer.headers["etag"] == f'"{box["revision"]}"'
     assert (box["name"], box["class_id"], box["has_hull"], box["revision"]) == ("the ball", 0, True, 1)
-    assert box["hull_options"] == {"orientation": "world", "position": "box", "widen_px": 0, "ground": None, "fitted": False}
+    assert box["hull_options"] == USUAL
     hull = box["hull"]
     assert hull["position"] == "box"
     assert BALL < hull["volume"] < 1.5 * BALL
@@ -229,11 +231,11 @@ def test_a_box_is_made_again_by_what_is_given(client: httpx.Client, ring: str, w
     assert (stale.status_code, stale.json()["current"]["id"]) == (412, box["id"])
     tag = {"If-Match": f'"{box["revision"]}"'}
     upright = client.put(hull, json={"orientation": "upright", "class_id": 1}, headers=tag).json()
-    assert upright["hull_options"] == {"orientation": "upright", "position": "box", "widen_px": 2, "ground": 0.02, "fitted": False}
+    assert upright["hull_options"] == {**USUAL, "orientation": "upright", "widen_px": 2, "ground": 0.02}
     assert {mask["class_id"] for mask in client.get(f"{ring}/masks").json()} == {1}
     tag = {"If-Match": f'"{upright["revision"]}"'}
     free = client.put(hull, json={"ground": None, "widen_px": 0}, headers=tag).json()
-    assert free["hull_options"] == {"orientation": "upright", "position": "box", "widen_px": 0, "ground": None, "fitted": False}
+    assert free["hull_options"] == {**USUAL, "orientation": "upright"}
     assert client.put(hull, json={"orient": "free"}, headers=tag).status_code == 422
 
 
