@@ -7,10 +7,18 @@ from typing import Literal
 
 import numpy as np
 import shapely
+from jaxtyping import Float
 
 from ars_web.errors import BadInput, ViewsDisagree
+from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box
-from ars_web.geometry.camera import Camera, normalised_from_pixels, pixels_from_image
+from ars_web.geometry.camera import (
+    Camera,
+    image_from_pixels,
+    normalised_from_pixels,
+    pixels_from_camera_points,
+    pixels_from_image,
+)
 from ars_web.geometry.hull_box import box_of_hull
 from ars_web.geometry.mask_regions import multipolygon, polygons_of
 from ars_web.geometry.mesh_silhouette import silhouette
@@ -23,6 +31,12 @@ from ars_web.sessions.model import HullOptions
 
 SMALL_ANGLE = math.radians(60.0)
 """Between the two views that are farthest apart, below which the hull is more than 2.7 times too large."""
+
+WORTH_DRAWING = math.radians(5.0)
+"""By which a further view must widen the angle, for it to be advised."""
+
+LITTLE_LEFT = 0.4
+"""Of the rectangle round an outline. Outlines of one object, drawn with care, leave nearly all of each other."""
 
 DEPTHS = 100.0
 """An object is at most so many times as far from a camera as the recording is wide, and no nearer than that part."""
@@ -86,14 +100,15 @@ def preview_hull(
     """
     hull, problem = _hull(views, options)
     angle = None if hull is None else angle_between(views, hull.centre_of_mass)
+    next_view = _next_view(taken, views, hull) if problem is None or _tells_nothing(problem) else None
     return HullPreview(
         hull=hull,
         box=None if hull is None else box_of_hull(hull, orientation=options.orientation, position=options.position),
         angle=angle,
         overlays=_overlays(taken, views, options, hull, show_in),
         problem=problem,
-        next_view=_next_view(taken, views, hull) if problem is None or _tells_nothing(problem) else None,
-        warnings=() if angle is None or angle >= SMALL_ANGLE else (_one_sided(angle),),
+        next_view=next_view,
+        warnings=() if hull is None or angle is None else _warnings(taken, views, hull, angle, next_view),
     )
 
 
@@ -171,9 +186,48 @@ def _tells_nothing(problem: BadInput) -> bool:
     return isinstance(problem, ViewsDisagree) and all(math.isnan(pixels) for _, pixels in problem.misfits)
 
 
-def _one_sided(angle: float) -> str:
-    degrees = math.degrees(angle)
-    return (
-        f"The outlines see the object from {degrees:.0f} degrees apart at most, so that its depth is uncertain and the"
-        " box too long. Draw it in a frame from further round, too."
-    )
+def _warnings(
+    taken: Photographed, views: Sequence[View], hull: VisualHull, angle: float, next_view: SuggestedView | None
+) -> tuple[str, ...]:
+    """What is uncertain of a hull, and what to do about it."""
+    found: list[str] = []
+    left = {view.frame: _share_left(view, hull) for view in views}
+    worst = min(left, key=lambda frame: left[frame])
+    if left[worst] < LITTLE_LEFT:
+        shares = ", ".join(f"{100 * share:.0f} % in frame {frame}" for frame, share in left.items())
+        found.append(
+            f"Little of the outlines is left in the hull ({shares}): one of them is of something else, or far too"
+            " small. Look where the hull lies in each."
+        )
+    if angle < SMALL_ANGLE:
+        further = 0.0
+        if next_view is not None:
+            there = View(next_view.frame, *_camera_at(taken, next_view.frame), views[0].polygons)
+            further = angle_between([*views, there], hull.centre_of_mass)
+        found.append(
+            f"The outlines see the object from {math.degrees(angle):.0f} degrees apart at most, so that its depth is"
+            " uncertain and the box too long. "
+            + (
+                "Draw it in a frame from further round, too."
+                if further > angle + WORTH_DRAWING
+                else "No frame shows it from much further round: say what it stands on, or fit the box to its masks."
+            )
+        )
+    return tuple(found)
+
+
+def _share_left(view: View, hull: VisualHull) -> float:
+    """How much of the rectangle round an outline the one round the hull takes up, as its camera sees them; at least
+    what is: a hull may go on beyond the image."""
+    points = rigid_transform.transform_points(rigid_transform.invert(view.T_world_camera), hull.vertices)
+    seen = image_from_pixels(pixels_from_camera_points(view.camera, points))
+    seen = seen[np.isfinite(seen).all(axis=1)]
+    drawn = np.concatenate([polygon.outer for polygon in view.polygons])
+    if len(seen) == 0:
+        return 0.0
+    share = np.ptp(seen, axis=0).prod() / max(float(np.ptp(drawn, axis=0).prod()), 1e-12)
+    return min(float(share), 1.0)
+
+
+def _camera_at(taken: Photographed, frame: int) -> tuple[Camera, Float[np.ndarray, "4 4"]]:
+    return camera_of(taken, frame), taken.frames.Ts_world_camera[frame]

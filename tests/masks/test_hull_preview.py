@@ -66,3 +66,27 @@ def test_whatever_is_drawn_gives_a_hull_or_a_reason(taken: Photographs, ring_sce
     assert box.size == pytest.approx(found.box.size, rel=1e-9)
     along = (found.hull.vertices - box.T_world_box[:3, 3]) @ box.T_world_box[:3, :3]
     assert (np.abs(along) <= box.size / 2 + 1e-9).all()
+
+
+def test_an_outline_of_something_else_that_leaves_a_sliver_is_told(taken: Photographs, ring_scene) -> None:
+    def warnings(centre: tuple[float, float, float]) -> tuple[str, ...]:
+        outlines = [(frame, [Polygon(ring_scene.outline(frame))]) for frame in (0, 5)]
+        outlines.append((3, [Polygon(ring_scene.outline(3, centre=centre))]))
+        found = preview_hull(taken, views_of(taken, outlines), HullOptions(), show_in=[])
+        assert found.hull is not None
+        return found.warnings
+
+    assert warnings(ring_scene.CENTRE) == ()
+    (warning,) = warnings((0.0, 0.0, 0.11))  # 60 mm above the ball, whose radius is 40
+    assert warning.startswith("Little of the outlines is left in the hull (")
+    assert "% in frame 3" in warning
+
+
+def test_nobody_is_sent_round_an_object_that_no_frame_shows_from_there(taken: Photographs, ring_scene) -> None:
+    few = FrameTable(("0", "1"), (), np.zeros(2, int), taken.frames.Ts_world_camera[:2])
+    outlines = [(frame, [Polygon(ring_scene.outline(frame))]) for frame in (0, 1)]
+    for photographs, advice in ((taken, "from further round"), (Photographs(taken.cameras, few), "fit the box")):
+        found = preview_hull(photographs, views_of(photographs, outlines), HullOptions(), show_in=[])
+        (warning,) = found.warnings
+        assert "degrees apart at most" in warning
+        assert advice in warning

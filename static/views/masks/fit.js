@@ -1,5 +1,6 @@
 /** "Fit to masks": the box is moved to where what would be exported fits its masks best; how well it does, frame by frame. */
 
+import { intoSight } from "../../lib/in_sight.js";
 import { html, signal } from "../../lib/view.js";
 import * as store from "../../store.js";
 import { openView } from "./panes.js";
@@ -51,11 +52,11 @@ export function Fit({ box }) {
   const told = box === null ? undefined : fits.value.get(box.id);
   if (box === null || told === undefined) return null;
   const away = html`<button class="button link" onClick=${() => dismiss(box.id)}>Dismiss</button>`;
-  if ("problem" in told) return html`<p class="problem dismissible" role="alert">${told.problem} ${away}</p>`;
+  if ("problem" in told) return html`<p class="problem dismissible" ref=${intoSight} role="alert">${told.problem} ${away}</p>`;
   // Once the box is changed again, what was said of it is no more so.
   if (told.box.revision !== box.revision) return null;
   const outliers = told.residuals.filter(({ outlier }) => outlier).length;
-  return html`<div class="fit" role="group" aria-label="How well the box fits its masks">
+  return html`<div class="fit" ref=${intoSight} role="group" aria-label="How well the box fits its masks">
     <p class="row"><span role="status">Moved by ${told.moved_mm.toFixed(1)} mm; ${told.rms_px.toFixed(1)} px off on average${outliers > 0 ? `, ${outliers === 1 ? "one mask stands out" : `${outliers} masks stand out`}` : ""}.</span>${away}</p>
     ${told.warnings.map((text) => html`<p key=${text} class="problem">${text}</p>`)}
     <ul class="residuals">

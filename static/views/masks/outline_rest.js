@@ -1,5 +1,6 @@
 /** "Outline the rest": the server outlines the object in further frames, and tells how far it is. */
 
+import { intoSight } from "../../lib/in_sight.js";
 import { plural } from "../../lib/plural.js";
 import { leftInWords } from "../../lib/time_left.js";
 import { html, signal } from "../../lib/view.js";
@@ -49,11 +50,6 @@ export function OutlineRestButton({ subject }) {
     class="button small strong" disabled=${id === null || !enough || going || (box?.locked ?? false)} onClick=${() => id !== null && void start(id)}
     title=${enough ? "Let the machine outline the object in further frames, and check its outlines against each other" : "Outline the object in two frames first"}
   >Outline the rest</button>`;
-}
-
-/** What has come of it may lie below a long list of masks. @param {HTMLElement | null} told */
-function intoSight(told) {
-  told?.scrollIntoView({ block: "nearest" });
 }
 
 /** @param {{job: Job | {problem: string} | undefined, id: number | null}} props */
