@@ -29,9 +29,9 @@ def options_from_json(item: Any) -> HullOptions:
     if not isinstance(item, dict):
         raise BadInput(f"a hull's options must be an object, not {item!r}")
     values = cast(dict[str, Any], item)
-    return HullOptions(
-        values["orientation"], values["position"], values["widen_px"], values["ground"], bool(values["fitted"])
-    )
+    # What says nothing of fitting was written before there was any.
+    fitted = bool(values.get("fitted", False))
+    return HullOptions(values["orientation"], values["position"], values["widen_px"], values["ground"], fitted)
 
 
 def digest_from_json(text: Any) -> str:

@@ -52,6 +52,7 @@ import { paintBrush, paintImage, paintLoupe, paintOverlay } from "./pane_paintin
 const REACH = 12;
 const REACH_FINGER = 24;
 const KEY_ZOOM = 1.25;
+const UNSEEN = "rgb(0 0 0 / 0.004)";
 
 /** @type {Readonly<Record<string, readonly [number, number]>>} */
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
@@ -416,6 +417,9 @@ function cleared(canvas, pane) {
   const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
   context.setTransform(1, 0, 0, 1, 0, 0);
   context.clearRect(0, 0, canvas.width, canvas.height);
+  // Chromium may go on showing what was there where a frame does nothing but clear.
+  context.fillStyle = UNSEEN;
+  context.fillRect(0, 0, 1, 1);
   context.setTransform(canvas.width / Math.max(1, pane.width), 0, 0, canvas.height / Math.max(1, pane.height), 0, 0);
   return context;
 }
