@@ -239,6 +239,10 @@ def test_what_a_scene_says_after_its_page_has_gone_is_let_drop(line, sid: str, s
         send = scene.send[sid, A]
     until(lambda: scene.of(A)[-1] == ("detach",))
     send(Refused("too late"))
+    with line() as page:  # the same view again, as after a reload
+        assert page.next()["type"] == "ready"
+        scene.send[sid, A](Refused("in time"))
+        assert page.next("refused")["detail"] == "in time"
 
 
 def test_a_slow_page_gets_the_newest_drag_and_every_edit(

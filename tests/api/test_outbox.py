@@ -75,6 +75,13 @@ def test_once_closed_it_takes_nothing_also_when_its_loop_is_gone() -> None:
         outbox = Outbox[str](asyncio.get_running_loop())
         outbox.put("a")
         outbox.close()
+        outbox.put("b")
+        with pytest.raises(TimeoutError):
+            await asyncio.wait_for(outbox.take(), 0.1)
         return outbox
 
-    asyncio.run(use()).put("b")
+    with asyncio.Runner() as runner:
+        closed = runner.run(use())
+        loop = runner.get_loop()
+    assert loop.is_closed()
+    closed.put("c")  # a closed loop would refuse to be told

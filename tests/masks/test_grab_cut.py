@@ -1,5 +1,6 @@
 """The smart tool: objects of the generated recording found from a rough rectangle, scribbles, and what is refused."""
 
+import sys
 from dataclasses import dataclass
 
 import cv2
@@ -69,7 +70,8 @@ def test_every_object_that_is_wholly_visible_is_found_from_a_rough_rectangle(who
         by_name.setdefault(sight.name, []).append(overlap(found, sight.truth))
     with capsys.disabled():
         for name, ious in sorted(by_name.items()):
-            print(f"  {name:12} mean {np.mean(ious):.3f} of {len(ious)}: {' '.join(f'{v:.2f}' for v in ious)}")  # noqa: T201
+            each = " ".join(f"{iou:.2f}" for iou in ious)
+            sys.stdout.write(f"  {name:12} mean {np.mean(ious):.3f} of {len(ious)}: {each}\n")
     assert len(by_name) >= 8
     for name, ious in by_name.items():
         assert min(np.mean(ious), np.median(ious)) >= GOOD, name
