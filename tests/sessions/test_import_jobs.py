@@ -13,6 +13,7 @@ from ars_web.errors import BadInput, NotFound
 from ars_web.recordings.options import ReadOptions
 from ars_web.sessions import import_jobs
 from ars_web.sessions.import_jobs import AT_ONCE, ImportJob, ImportJobs, ImportOrder
+from ars_web.sessions.jobs import Jobs
 from ars_web.sessions.store import SessionStore
 from ars_web.sessions.uploads import UPLOADS, Upload, Uploads
 
@@ -67,15 +68,15 @@ class Gate:
     def __init__(self, monkeypatch: pytest.MonkeyPatch, *, at: str) -> None:
         self.reached = threading.Semaphore(0)
         self.opened = threading.Event()
-        change = ImportJobs._change
+        change = Jobs.change
 
-        def hold(jobs: ImportJobs, job_id: str, **changes: object) -> None:
+        def hold(jobs: Jobs[ImportJob], job_id: str, **changes: object) -> None:
             change(jobs, job_id, **changes)
             if changes.get("phase") == at and changes.get("done") == 1:
                 self.reached.release()
                 assert self.opened.wait(SECONDS)
 
-        monkeypatch.setattr(ImportJobs, "_change", hold)
+        monkeypatch.setattr(Jobs, "change", hold)
 
     def wait(self) -> None:
         assert self.reached.acquire(timeout=SECONDS)
@@ -125,15 +126,15 @@ def test_what_is_about_to_appear_is_not_cancelled(
     jobs: ImportJobs, store: SessionStore, scene: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Cancelled must mean that there is no session."""
-    change = ImportJobs._change
+    change = Jobs.change
     answers: list[ImportJob] = []
 
-    def cancel_at_the_end(self: ImportJobs, job_id: str, **changes: object) -> None:
+    def cancel_at_the_end(self: Jobs[ImportJob], job_id: str, **changes: object) -> None:
         change(self, job_id, **changes)
         if changes.get("settled"):
             answers.append(self.cancel(job_id))
 
-    monkeypatch.setattr(ImportJobs, "_change", cancel_at_the_end)
+    monkeypatch.setattr(Jobs, "change", cancel_at_the_end)
     job = jobs.wait(jobs.start(order(scene)).id, timeout=SECONDS)
     assert [answer.state for answer in answers] == ["running"]
     assert job.state == "done"
@@ -201,7 +202,7 @@ def test_a_repeat_with_the_same_key_is_the_same_job(jobs: ImportJobs, store: Ses
     assert first.id == again.id
     done = jobs.wait(first.id, timeout=SECONDS)
     assert jobs.start(order(scene), key="import 1") == done
-    with pytest.raises(BadInput, match="another import"):
+    with pytest.raises(BadInput, match="something else"):
         jobs.start(order(scene, name="other"), key="import 1")
     assert len(store.list()) == 1
 
@@ -240,7 +241,7 @@ def test_a_server_that_ends_stops_its_imports(
     gate.wait()
     closing = threading.Thread(target=jobs.close)
     closing.start()
-    assert jobs._closing.wait(SECONDS)
+    assert jobs._jobs._closing.wait(SECONDS)
     gate.opened.set()
     closing.join(SECONDS)
     assert not closing.is_alive()
@@ -265,7 +266,7 @@ def test_a_fault_of_the_program_ends_the_job(
 
 
 def test_old_jobs_are_forgotten(jobs: ImportJobs, scene: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(import_jobs, "REMEMBERED", 3)
+    monkeypatch.setattr("ars_web.sessions.jobs.REMEMBERED", 3)
     ids = []
     for i in range(5):
         ids.append(jobs.start(order(scene / "nothing", name=f"{i}"), key=f"{i}").id)
