@@ -273,3 +273,18 @@ def test_old_jobs_are_forgotten(jobs: ImportJobs, scene: Path, monkeypatch: pyte
         jobs.wait(ids[-1], timeout=SECONDS)
     assert [job.id for job in jobs.list()] == ids[:1:-1]
     assert jobs.start(order(scene / "nothing", name="0"), key="0").id not in ids
+
+
+def test_what_was_sent_is_gone_before_an_import_is_told_to_be_done(
+    jobs: ImportJobs, uploads: Uploads, scene: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    states: list[str] = []
+    discard = Uploads.discard
+
+    def watched(self: Uploads, id_: str) -> None:
+        discard(self, id_)
+        states.extend(job.state for job in jobs.list())
+
+    monkeypatch.setattr(Uploads, "discard", watched)
+    job = jobs.wait(jobs.start(of_upload(sent(uploads, scene))).id, timeout=SECONDS)
+    assert (job.state, states) == ("done", ["running"])
