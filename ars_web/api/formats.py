@@ -9,7 +9,7 @@ from ars_web.api.dependencies import StrictRoute
 from ars_web.api.problems import documented
 from ars_web.datasets.option_list import OptionType, export_options
 from ars_web.datasets.registry import WRITERS
-from ars_web.datasets.samples import SHAPES
+from ars_web.datasets.shapes import SHAPES
 from ars_web.recordings.registry import READERS
 
 router = APIRouter(prefix="/api/formats", tags=["formats"], route_class=StrictRoute)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, cast
 
 from ars_web.datasets.options import ExportOptions
-from ars_web.datasets.samples import SHAPES
+from ars_web.datasets.shapes import SHAPES
 
 OptionType = Literal["integer", "number", "choice", "integers", "texts"]
 

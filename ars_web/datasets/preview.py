@@ -9,7 +9,8 @@ from jaxtyping import UInt8
 
 from ars_web.datasets.drawing import Canvas, Color, color_of
 from ars_web.datasets.file_names import stems
-from ars_web.datasets.samples import FrameLabel, frame_labels, hulls_of, labels_in_frames
+from ars_web.datasets.samples import FrameLabel, frame_labels, labels_in_frames
+from ars_web.datasets.shapes import meshes_of
 from ars_web.errors import BadInput, NotFound, StoreError
 from ars_web.recordings.images import read_image
 from ars_web.sessions.model import SessionSnapshot
@@ -59,7 +60,7 @@ def labelled_frames(snapshot: SessionSnapshot) -> list[int]:
         frames.camera_ids,
         frames.Ts_world_camera,
         boxes,
-        hulls=hulls_of(snapshot, shape=None),
+        meshes=meshes_of(snapshot, shape=None),
         with_visible=False,
     )
     return np.flatnonzero(~np.isnan(table.bbox[..., 0]).all(axis=1)).tolist() if boxes else []

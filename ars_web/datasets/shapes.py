@@ -1,0 +1,80 @@
+"""Shapes: what the labels of a session's boxes are drawn round, and where they are seen from."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from ars_web.errors import BadInput
+from ars_web.geometry.box import Box
+from ars_web.geometry.camera import Camera
+from ars_web.geometry.keypoints import Keypoint, keypoints_world
+from ars_web.geometry.mesh import Mesh
+from ars_web.sessions.model import SessionSnapshot
+
+SHAPES: tuple[str, ...] = ("box", "hull")
+"""What labels are drawn round today. A box without a stored hull is itself its shape, whatever was asked for."""
+
+
+@dataclass(frozen=True, eq=False)
+class PosedShapes:
+    """b shapes as n frames see them, everything in the world, metres.
+
+    Attributes:
+        cameras: by id.
+        camera_ids: (n,) keys into `cameras`.
+        Ts_world_camera: (n, 4, 4).
+        boxes: b of them.
+        meshes: what the labels of each box are drawn round; None: the box.
+        keypoints_world: (b, k, 3) named points of each object, NaN beyond those that it has.
+    """
+
+    cameras: Mapping[int, Camera]
+    camera_ids: Int[np.ndarray, "n"]
+    Ts_world_camera: Float[np.ndarray, "n 4 4"]
+    boxes: Sequence[Box]
+    meshes: Sequence[Mesh | None]
+    keypoints_world: Float[np.ndarray, "b k 3"]
+
+    def by_camera(self) -> Iterator[tuple[Camera, Int[np.ndarray, "m"]]]:
+        """Each camera that occurs, with the rows of its frames."""
+        yield from by_camera(self.cameras, self.camera_ids)
+
+
+def stacked_keypoints(boxes: Sequence[Box], keypoints: Sequence[Sequence[Keypoint]]) -> Float[np.ndarray, "b k 3"]:
+    """The keypoints of each box in the world, NaN beyond those that it has."""
+    most = max((len(points) for points in keypoints), default=0)
+    found = np.full((len(boxes), most, 3), np.nan)
+    for row, (box, points) in enumerate(zip(boxes, keypoints, strict=True)):
+        found[row, : len(points)] = keypoints_world(box, points)
+    return found
+
+
+def by_camera(
+    cameras: Mapping[int, Camera], camera_ids: Int[np.ndarray, "n"]
+) -> Iterator[tuple[Camera, Int[np.ndarray, "m"]]]:
+    """Each camera that occurs, with the rows of its frames."""
+    for camera_id in np.unique(camera_ids).tolist():
+        yield cameras[camera_id], np.flatnonzero(camera_ids == camera_id)
+
+
+def meshes_of(snapshot: SessionSnapshot, *, shape: str | None) -> list[Mesh | None]:
+    """What labels are drawn round, by ascending box id; None: the box itself.
+
+    `shape` is the export option of that name: for `box` it is always the box; for None and `hull` the stored hull
+    where there is one.
+    """
+    state = snapshot.state
+    return [
+        Mesh(*snapshot.hulls[digest].in_world(box.box)) if shape != "box" and (digest := box.hull) is not None else None
+        for _, box in sorted(state.boxes.items())
+    ]
+
+
+def check_shape(shape: str | None) -> None:
+    """Raises BadInput for a label shape that cannot be made."""
+    if shape == "mesh":
+        raise BadInput("shape 'mesh' needs a mesh for each class and this session has none; use 'box' or 'hull'")
+    if shape not in (None, "box", "hull"):
+        raise BadInput(f"shape {shape!r} is unknown; known are box, hull and mesh")
