@@ -44,6 +44,7 @@ install_import_hook(
             "visual_hull",
             "hull_box",
             "mesh_silhouette",
+            "projected_points",
         )
     ],
     "beartype.beartype",
