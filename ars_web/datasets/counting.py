@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Int
 
 from ars_web.datasets.planned import ExportPlan
 from ars_web.datasets.report import SplitCounts
@@ -30,19 +30,19 @@ class Selection:
     dropped: dict[str, int]
 
 
-def select_labels(plan: ExportPlan, start: int, stop: int, *, with_visible: bool = False) -> Selection:
-    """The labels of the plan's frames from `start` up to `stop`, all of one session.
+def select_labels(plan: ExportPlan, rows: slice | Int[np.ndarray, "n"], *, with_visible: bool = False) -> Selection:
+    """The labels of some of the plan's frames, all of one session.
 
     Visible shares are found where the options drop labels by them, or `with_visible` asks for them.
     """
     frames = plan.frames
-    session = plan.sessions[int(frames.session[start])]
+    session = plan.sessions[int(frames.session[rows][0])]
     rectify = plan.options.images == "rectify"
     keypoints = [plan.classes[place].keypoints for place in session.class_of_box]
     shapes = PosedShapes(
         cameras={i: rectified(c) if rectify else c for i, c in session.cameras.items()},
-        camera_ids=frames.camera_id[start:stop],
-        Ts_world_camera=frames.Ts_world_camera[start:stop],
+        camera_ids=frames.camera_id[rows],
+        Ts_world_camera=frames.Ts_world_camera[rows],
         boxes=session.boxes,
         meshes=session.meshes,
         keypoints_world=stacked_keypoints(session.boxes, keypoints),

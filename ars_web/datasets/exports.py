@@ -25,8 +25,8 @@ from ars_web.datasets.forecast import Forecast, forecast
 from ars_web.datasets.jobs import partial_folder, run_export
 from ars_web.datasets.options import ExportOptions
 from ars_web.datasets.plan import check_merged, plan_export
-from ars_web.datasets.planned import ExportPlan
 from ars_web.datasets.plan_files import read_digest, read_plan
+from ars_web.datasets.planned import ExportPlan
 from ars_web.datasets.registry import writer_of
 from ars_web.datasets.shapes import check_shape
 from ars_web.errors import ArsError, BadInput, Cancelled, Conflict, NotFound, StoreError

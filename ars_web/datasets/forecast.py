@@ -80,7 +80,7 @@ def _counted(plan: ExportPlan, cancelled: Callable[[], bool]) -> Iterator[ShardR
             if cancelled():
                 raise Cancelled("nobody waits for what the export would write any more")
             last = min(first + step, stop)
-            selection = select_labels(plan, first, last)
+            selection = select_labels(plan, slice(first, last))
             splits = [SPLITS[i] for i in plan.frames.split[first:last].tolist()]
             counts = split_counts(splits, selection.keep, session.class_of_box, plan.class_names)
             yield ShardReport(splits=counts, dropped=selection.dropped, digests={})

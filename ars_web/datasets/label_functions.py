@@ -122,7 +122,9 @@ LABEL_FUNCTIONS: dict[str, LabelFunction] = {
         LabelFunction("convex", "Convex outline", "the convex hull of what is in the image", _convex),
         LabelFunction("silhouette", "Silhouette", "the border of what is in the image, holes included", _silhouette),
         LabelFunction("rectangle", "Turned rectangle", "the rectangle of the smallest area", _rectangle),
-        LabelFunction("keypoints", "Keypoints", "the object's named points, and which of them are in sight", _keypoints),
+        LabelFunction(
+            "keypoints", "Keypoints", "the object's named points, and which of them are in sight", _keypoints
+        ),
     )
 }
 """In the order in which they are offered."""

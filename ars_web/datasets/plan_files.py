@@ -130,7 +130,9 @@ def _arrays(plan: ExportPlan) -> dict[str, np.ndarray]:
         meshes = [mesh for mesh in session.meshes if mesh is not None]
         if meshes:
             # A session whose labels are drawn round its boxes has none of these.
-            counts = [(0, 0) if mesh is None else (len(mesh.vertices_world), len(mesh.faces)) for mesh in session.meshes]
+            counts = [
+                (0, 0) if mesh is None else (len(mesh.vertices_world), len(mesh.faces)) for mesh in session.meshes
+            ]
             arrays |= {
                 f"mesh_counts_{number}": np.array(counts, dtype=np.int64),
                 f"mesh_vertices_{number}": np.concatenate([mesh.vertices_world for mesh in meshes]),

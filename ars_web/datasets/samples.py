@@ -172,7 +172,9 @@ def outlines_in_frames(
             found.append((rows, columns, *geometry.outlines(camera, Ts, of_boxes, wanted[np.ix_(rows, columns)])))
         if solids:
             columns = np.array(list(solids))
-            found.append((rows, columns, *mesh_outlines(camera, Ts, list(solids.values()), wanted[np.ix_(rows, columns)])))
+            found.append(
+                (rows, columns, *mesh_outlines(camera, Ts, list(solids.values()), wanted[np.ix_(rows, columns)]))
+            )
     for rows, columns, _, offsets in found:
         lengths[np.ix_(rows, columns)] = np.diff(offsets).reshape(len(rows), len(columns))
     starts = np.concatenate([[0], np.cumsum(lengths)])

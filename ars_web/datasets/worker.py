@@ -18,8 +18,8 @@ from ars_web.datasets.counting import select_labels, split_counts
 from ars_web.datasets.file_names import safe
 from ars_web.datasets.images import image_name, place_image
 from ars_web.datasets.label_functions import label_function
-from ars_web.datasets.planned import ExportPlan
 from ars_web.datasets.plan_files import read_plan
+from ars_web.datasets.planned import ExportPlan
 from ars_web.datasets.registry import writer_of
 from ars_web.datasets.report import ShardReport
 from ars_web.datasets.samples import outlines_of_shapes
@@ -138,16 +138,14 @@ def _shard(plan: ExportPlan, number: int, images: Path) -> tuple[Shard, dict[str
     frames, writer = plan.frames, writer_of(plan.format)
     session_number = int(frames.session[start])
     session = plan.sessions[session_number]
-    selection = select_labels(plan, start, stop, with_visible=writer.with_visible)
+    selection = select_labels(plan, slice(start, stop), with_visible=writer.with_visible)
     shapes, keep = selection.shapes, selection.keep
     sizes: Int[np.ndarray, "n 2"] = np.array(
         [(shapes.cameras[i].width, shapes.cameras[i].height) for i in shapes.camera_ids.tolist()], dtype=np.int64
     )
     splits = [SPLITS[i] for i in frames.split[start:stop].tolist()]
     sources, stems = frames.sources[start:stop], frames.stems[start:stop]
-    names = [
-        image_name(stem, source, only_jpeg=writer.only_jpeg) for stem, source in zip(stems, sources, strict=True)
-    ]
+    names = [image_name(stem, source, only_jpeg=writer.only_jpeg) for stem, source in zip(stems, sources, strict=True)]
     has_images = plan.options.images != "none"
     files = [images / _image_folder(writer, split) / name for split, name in zip(splits, names, strict=True)]
     return (

@@ -14,8 +14,8 @@ from ars_web.datasets.forecast import forecast
 from ars_web.datasets.jobs import run_export
 from ars_web.datasets.options import ExportOptions
 from ars_web.datasets.plan import plan_export
-from ars_web.datasets.planned import ExportPlan
 from ars_web.datasets.plan_files import digest_of, read_plan, write_plan
+from ars_web.datasets.planned import ExportPlan
 from ars_web.datasets.preview import draw_frame, labelled_frames
 from ars_web.datasets.registry import WRITERS
 from ars_web.datasets.samples import frame_labels, label_table, labels_in_frames, outlines_in_frames
