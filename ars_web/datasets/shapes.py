@@ -72,6 +72,21 @@ def meshes_of(snapshot: SessionSnapshot, *, shape: str | None) -> list[Mesh | No
     ]
 
 
+def posed_shapes(snapshot: SessionSnapshot, indices: Sequence[int], *, shape: str | None) -> PosedShapes:
+    """The shapes of a session's boxes, by ascending box id, as the frames at `indices` see them."""
+    rows, state = np.asarray(indices, dtype=np.int64), snapshot.state
+    boxes = [box for _, box in sorted(state.boxes.items())]
+    keypoints = [state.keypoints_of(box.class_id) for box in boxes]
+    return PosedShapes(
+        cameras=snapshot.cameras,
+        camera_ids=snapshot.frames.camera_ids[rows],
+        Ts_world_camera=snapshot.frames.Ts_world_camera[rows],
+        boxes=[box.box for box in boxes],
+        meshes=meshes_of(snapshot, shape=shape),
+        keypoints_world=stacked_keypoints([box.box for box in boxes], keypoints),
+    )
+
+
 def check_shape(shape: str | None) -> None:
     """Raises BadInput for a label shape that cannot be made."""
     if shape == "mesh":
