@@ -1,6 +1,7 @@
 """The mesh of a class or of one box: the object's own surface in metres, named by what it holds."""
 
 import hashlib
+import re
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
@@ -12,11 +13,17 @@ from ars_web.errors import BadInput
 from ars_web.geometry.box import Box
 from ars_web.geometry.mesh import edges_of_faces
 from ars_web.geometry.rigid_transform import transform_points
+from ars_web.sessions.names import checked_name
 
 MOST_FACES = 200_000
 """Of a mesh, those that are seen from the back included. Labels of every frame are computed from them."""
 
 MOST_CORNERS = 3 * MOST_FACES
+
+MESH_UNITS = ("mm", "cm", "m", "in")
+MESH_ORIGINS = ("centre", "file")
+
+_AXES = re.compile(r"-?[xyz],-?[xyz],-?[xyz]")
 
 FARTHEST = 100.0
 """Metres from the box's centre, along each of its axes."""
@@ -118,6 +125,15 @@ class MeshSource:
     unit: str
     axes: str
     origin: str
+
+    def __post_init__(self) -> None:
+        """Raises BadInput for what cannot be shown, or is none of what they can be."""
+        object.__setattr__(self, "name", checked_name(self.name, what="the file of a mesh"))
+        for what, value, known in (("unit", self.unit, MESH_UNITS), ("origin", self.origin, MESH_ORIGINS)):
+            if value not in known:
+                raise BadInput(f"a mesh's {what} must be one of {', '.join(known)}, not {value!r}")
+        if not _AXES.fullmatch(self.axes):
+            raise BadInput(f"a mesh's axes must be such as x,-z,y, not {self.axes!r}")
 
 
 @dataclass(frozen=True, eq=False)
