@@ -79,9 +79,7 @@ def picture(
     max_truncated: Annotated[float, Query(ge=0.0, le=1.0)] = 1.0,
 ) -> Response:
     """One frame with the labels that an export would write, drawn as the format holds them."""
-    options = ExportOptions.model_validate(
-        {"shape": shape, "min_visible": min_visible, "max_truncated": max_truncated}
-    )
+    options = ExportOptions.model_validate({"shape": shape, "min_visible": min_visible, "max_truncated": max_truncated})
     drawn = format_picture(services.store.snapshot(sid), format=format, options=options, index=frame)
     return Response(drawn, media_type="image/jpeg", headers={"Cache-Control": "private, no-cache"})
 

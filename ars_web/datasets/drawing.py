@@ -102,7 +102,7 @@ class Canvas:
     def tag(self, bbox: tuple[float, float, float, float], name: str, note: str, color: Color) -> None:
         """Write a name and a note on the colour, at a corner of the bounding box where nothing is written yet."""
         size, pad = 0.52 * self._unit, round(6 * self._unit)
-        texts = (plain(name), note) if note else (plain(name),)
+        texts = [plain(name), *([note] if note else [])]
         widths = [cv2.getTextSize(text, _FONT, size, 1)[0][0] for text in texts]
         line = cv2.getTextSize("Ag", _FONT, size, 1)[0][1]
         width, height = sum(widths) + (1 + len(texts)) * pad, line + 2 * pad
@@ -112,9 +112,10 @@ class Canvas:
         cv2.rectangle(self.pixels, (x, y), (x + width - 1, y + height - 1), color, -1)
         ink = readable_on(color)
         baseline = y + pad + line
-        self._write(texts[0], (x + pad, baseline), size, ink)
-        if note:
-            self._write(texts[1], (x + 2 * pad + widths[0], baseline), size, ink)
+        left = x + pad
+        for text, wide in zip(texts, widths, strict=True):
+            self._write(text, (left, baseline), size, ink)
+            left += wide + pad
 
     def caption(self, left: str, right: str) -> None:
         """Write on a strip added below the image, where it hides nothing. Drawn last."""

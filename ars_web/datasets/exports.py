@@ -131,12 +131,12 @@ class ExportJobs:
             StoreError: the job cannot be kept.
         """
         writer_of(format)
-        check_shape(options.shape)
         with self._lock:
             before = self._made_with(key, sid, format, options)
         if before is not None:
             return before
         snapshots = self._snapshots(sid, options)
+        check_shape(options.shape, snapshots)
         job = ExportJob(
             id=f"x{secrets.token_hex(6)}",
             session_id=sid,

@@ -2,7 +2,6 @@
 
 import cv2
 import numpy as np
-from jaxtyping import Int
 
 from ars_web.datasets.drawing import Canvas, color_of
 from ars_web.datasets.frame_marks import frame_shapes
@@ -76,8 +75,8 @@ def telling_frame(snapshot: SessionSnapshot, options: ExportOptions) -> int:
     count = len(snapshot.frames)
     if count == 0:
         raise BadInput(f"session {snapshot.id} has no frames to show")
-    rows: Int[np.ndarray, "m"] = np.unique(np.linspace(0, count - 1, min(count, MOST_TRIED)).round().astype(np.int64))
-    table = labels_of_shapes(posed_shapes(snapshot, rows.tolist(), shape=options.shape))
+    rows = sorted({round(place) for place in np.linspace(0, count - 1, min(count, MOST_TRIED)).tolist()})
+    table = labels_of_shapes(posed_shapes(snapshot, rows, shape=options.shape))
     keep, _ = kept(table, options)
     seen = np.where(keep, np.nan_to_num(table.visible) * (1.0 - table.truncated), 0.0).sum(axis=1)
-    return int(rows[int(np.argmax(keep.sum(axis=1) + 0.5 * seen))])
+    return rows[int(np.argmax(keep.sum(axis=1) + 0.5 * seen))]

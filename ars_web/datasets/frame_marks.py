@@ -59,16 +59,14 @@ def frame_shapes(snapshot: SessionSnapshot, index: int, *, shape: str | None = N
         NotFound: the session has no such frame.
         BadInput: there is no such shape, or the session has none of it.
     """
-    check_shape(shape)
+    check_shape(shape, [snapshot])
     if not 0 <= index < len(snapshot.frames):
         raise NotFound(f"session {snapshot.id} has no frame {index}; its frames are 0 to {len(snapshot.frames) - 1}")
     shapes = posed_shapes(snapshot, [index], shape=shape)
     return FrameShapes(shapes, labels_of_shapes(shapes))
 
 
-def frame_marks(
-    snapshot: SessionSnapshot, index: int, *, function: str, shape: str | None = None
-) -> list[FrameMark]:
+def frame_marks(snapshot: SessionSnapshot, index: int, *, function: str, shape: str | None = None) -> list[FrameMark]:
     """What a label function draws of each of the session's objects in frame `index`, by ascending box id.
 
     Raises:

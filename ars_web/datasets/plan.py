@@ -18,10 +18,8 @@ from ars_web.datasets.images import source_stamp
 from ars_web.datasets.options import ExportOptions, FrameChoice
 from ars_web.datasets.planned import SECONDS_PER_FRAME, ExportPlan, PlannedClass, PlannedFrames, PlannedSession
 from ars_web.datasets.registry import writer_of
-from ars_web.datasets.shapes import check_shape, meshes_of
+from ars_web.datasets.shapes import check_shape, meshes_of, shape_kinds
 from ars_web.errors import BadInput
-from ars_web.geometry.keypoints import DEFAULT_KEYPOINTS
-from ars_web.geometry.symmetry import NO_SYMMETRY
 from ars_web.sessions.model import SessionSnapshot
 
 SHARD_SECONDS = 10.0
@@ -52,8 +50,8 @@ def plan_export(
         BadFile: a source image is missing, or has become a link.
     """
     writer = writer_of(format)
-    check_shape(options.shape)
     check_merged(snapshots)
+    check_shape(options.shape, snapshots)
     options = options.model_copy(update={"sessions": tuple(s.id for s in snapshots[1:])})
     out = usable_out(out)
     chosen = [_chosen(options.frames, snapshot) for snapshot in snapshots]
@@ -110,7 +108,7 @@ def merged_classes(snapshots: Sequence[SessionSnapshot]) -> tuple[PlannedClass, 
     found: dict[str, PlannedClass] = {}
     for snapshot in snapshots:
         for _, a_class in sorted(snapshot.state.classes.items()):
-            planned = PlannedClass(a_class.name, DEFAULT_KEYPOINTS, NO_SYMMETRY)
+            planned = PlannedClass(a_class.name, snapshot.state.keypoints_of(a_class.id), a_class.symmetry)
             if found.setdefault(a_class.name, planned) != planned:
                 raise BadInput(
                     f"class {a_class.name!r} has other keypoints or another symmetry in session {snapshot.id} than in"
@@ -164,7 +162,7 @@ def _planned_session(snapshot: SessionSnapshot, class_names: Sequence[str], shap
         box_names=tuple(b.name for b in boxes),
         boxes=tuple(b.box for b in boxes),
         meshes=meshes,
-        drawn_round=tuple("box" if mesh is None else "hull" for mesh in meshes),
+        drawn_round=tuple(shape_kinds(snapshot, shape=shape)),
         class_of_box=tuple(place[b.class_id] for b in boxes),
     )
 

@@ -231,7 +231,7 @@ def frame_labels(snapshot: SessionSnapshot, index: int, *, shape: str | None = N
         NotFound: the session has no such frame.
         BadInput: `shape` is `mesh`, or no shape at all.
     """
-    check_shape(shape)
+    check_shape(shape, [snapshot])
     frames = snapshot.frames
     if not 0 <= index < len(frames):
         raise NotFound(f"session {snapshot.id} has no frame {index}; its frames are 0 to {len(frames) - 1}")

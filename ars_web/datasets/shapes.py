@@ -13,8 +13,8 @@ from ars_web.geometry.keypoints import Keypoint, keypoints_world
 from ars_web.geometry.mesh import Mesh
 from ars_web.sessions.model import SessionSnapshot
 
-SHAPES: tuple[str, ...] = ("box", "hull")
-"""What labels are drawn round today. A box without a stored hull is itself its shape, whatever was asked for."""
+SHAPES: tuple[str, ...] = ("box", "hull", "mesh")
+"""What labels can be drawn round. A box that has neither hull nor mesh is itself its shape, whatever was asked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,17 +59,34 @@ def by_camera(
         yield cameras[camera_id], np.flatnonzero(camera_ids == camera_id)
 
 
-def meshes_of(snapshot: SessionSnapshot, *, shape: str | None) -> list[Mesh | None]:
-    """What labels are drawn round, by ascending box id; None: the box itself.
+def shape_kinds(snapshot: SessionSnapshot, *, shape: str | None) -> list[str]:
+    """Which of SHAPES the labels of each box are drawn round, by ascending box id.
 
     `shape` is the export option of that name: for `box` it is always the box; for None and `hull` the stored hull
-    where there is one.
+    where there is one; for `mesh` the mesh of the box or its class, where there is none the hull.
     """
-    state = snapshot.state
-    return [
-        Mesh(*snapshot.hulls[digest].in_world(box.box)) if shape != "box" and (digest := box.hull) is not None else None
-        for _, box in sorted(state.boxes.items())
-    ]
+    kinds: list[str] = []
+    for _, box in sorted(snapshot.state.boxes.items()):
+        if shape == "mesh" and snapshot.state.mesh_of(box) is not None:
+            kinds.append("mesh")
+        else:
+            kinds.append("hull" if shape != "box" and box.has_hull else "box")
+    return kinds
+
+
+def meshes_of(snapshot: SessionSnapshot, *, shape: str | None) -> list[Mesh | None]:
+    """What labels are drawn round, by ascending box id, as `shape_kinds` says; None: the box itself."""
+    found: list[Mesh | None] = []
+    boxes = (box for _, box in sorted(snapshot.state.boxes.items()))
+    for box, kind in zip(boxes, shape_kinds(snapshot, shape=shape), strict=True):
+        digest = snapshot.state.mesh_of(box) if kind == "mesh" else box.hull if kind == "hull" else None
+        if digest is None:
+            found.append(None)
+        elif kind == "mesh":
+            found.append(Mesh(*snapshot.meshes[digest].in_world(box.box)))
+        else:
+            found.append(Mesh(*snapshot.hulls[digest].in_world(box.box)))
+    return found
 
 
 def posed_shapes(snapshot: SessionSnapshot, indices: Sequence[int], *, shape: str | None) -> PosedShapes:
@@ -87,9 +104,12 @@ def posed_shapes(snapshot: SessionSnapshot, indices: Sequence[int], *, shape: st
     )
 
 
-def check_shape(shape: str | None) -> None:
-    """Raises BadInput for a label shape that cannot be made."""
-    if shape == "mesh":
-        raise BadInput("shape 'mesh' needs a mesh for each class and this session has none; use 'box' or 'hull'")
-    if shape not in (None, "box", "hull"):
-        raise BadInput(f"shape {shape!r} is unknown; known are box, hull and mesh")
+def check_shape(shape: str | None, snapshots: Sequence[SessionSnapshot]) -> None:
+    """Raises BadInput for a label shape that is none, or that no object of the sessions has."""
+    if shape is not None and shape not in SHAPES:
+        raise BadInput(f"shape {shape!r} is unknown; known are {', '.join(SHAPES)}")
+    boxes = [(snapshot, box) for snapshot in snapshots for box in snapshot.state.boxes.values()]
+    if shape == "mesh" and boxes and all(snapshot.state.mesh_of(box) is None for snapshot, box in boxes):
+        raise BadInput(
+            "shape 'mesh' needs a mesh, and no class or box here has one; give a class its mesh, or use 'box' or 'hull'"
+        )
