@@ -264,6 +264,9 @@ def preview(
     session: take.Session,
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the pictures.")],
     frames: Annotated[int, typer.Option("--frames", metavar="N", min=1, help="How many.")] = 6,
+    kind: Annotated[
+        str | None, typer.Option("--format", metavar="FORMAT", help="Draw what this format holds of each label.")
+    ] = None,
     sessions: take.Sessions = take.SESSIONS,
     as_json: take.Json = False,
 ) -> None:
@@ -273,7 +276,7 @@ def preview(
 
     with SessionStore(sessions) as store:
         snapshot = store.snapshot(store.find(session))
-    pictures = draw(snapshot, out, count=frames)
+    pictures = draw(snapshot, out, count=frames, format=kind)
     if as_json:
         print_json(pictures)
     else:

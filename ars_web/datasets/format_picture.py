@@ -2,6 +2,7 @@
 
 import cv2
 import numpy as np
+from jaxtyping import UInt8
 
 from ars_web.datasets.drawing import Canvas, color_of
 from ars_web.datasets.frame_marks import frame_shapes
@@ -16,6 +17,9 @@ from ars_web.sessions.model import SessionSnapshot
 
 JPEG_QUALITY = 88
 
+FILLED = ("silhouette", "mask")
+"""Label functions whose area is tinted, too."""
+
 MOST_TRIED = 60
 """Frames, spread over the recording, among which the one with the most labels is shown."""
 
@@ -27,16 +31,34 @@ def format_picture(
     options: ExportOptions,
     index: int | None = None,
 ) -> bytes:
-    """A JPEG of frame `index`, or else of one with many labels, with the labels that an export would write, drawn as
-    the format holds them.
+    """A JPEG of frame `index`, or else of one with many labels, drawn by `draw_format`; raises as that does.
+
+    Raises:
+        BadInput: the session has no frame.
+    """
+    index = telling_frame(snapshot, options) if index is None else index
+    picture = draw_format(snapshot, index, format=format, options=options)
+    ok, content = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    assert ok, "OpenCV cannot encode JPEG"
+    return content.tobytes()
+
+
+def draw_format(
+    snapshot: SessionSnapshot,
+    index: int,
+    *,
+    format: str,  # noqa: A002 - the contract's name
+    options: ExportOptions,
+) -> UInt8[np.ndarray, "h w 3"]:
+    """The frame's image (BGR, enlarged where it is small) with the labels that an export would write, drawn as the
+    format holds them.
 
     Raises:
         NotFound: the session has no such frame.
-        BadInput: there is no such format or shape, or the session has no frame.
+        BadInput: there is no such format or shape.
         BadFile: the frame's image cannot be read.
     """
     writer = writer_of(format)
-    index = telling_frame(snapshot, options) if index is None else index
     found = frame_shapes(snapshot, index, shape=options.shape)
     keep, _ = kept(found.table, options)
     canvas = Canvas(read_image(snapshot.frames.images[index]))
@@ -57,13 +79,7 @@ def format_picture(
         x0, y0, x1, y1 = found.table.bbox[0, column].tolist()
         name = snapshot.state.classes[boxes[column].class_id].name
         canvas.tag((x0, y0, x1, y1), name, "", colors[column])
-    ok, content = cv2.imencode(".jpg", canvas.pixels, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
-    assert ok, "OpenCV cannot encode JPEG"
-    return content.tobytes()
-
-
-FILLED = ("silhouette", "mask")
-"""Label functions whose area is tinted, too."""
+    return canvas.pixels
 
 
 def telling_frame(snapshot: SessionSnapshot, options: ExportOptions) -> int:
