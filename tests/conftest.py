@@ -45,6 +45,8 @@ install_import_hook(
             "hull_box",
             "mesh_silhouette",
             "projected_points",
+            "convex_outlines",
+            "rings",
         )
     ],
     "beartype.beartype",

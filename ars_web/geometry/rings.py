@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -21,14 +22,14 @@ class Rings:
     """
 
     points: Float[np.ndarray, "m 2"]
-    ring_starts: Int[np.ndarray, "r+1"]
+    ring_starts: Int[np.ndarray, "r"]
     label_starts: Int[np.ndarray, "k"]
 
     def of(self, label: int) -> list[Float[np.ndarray, "k 2"]]:
         """The rings of the label with this number, frame * b + shape."""
         first, last = int(self.label_starts[label]), int(self.label_starts[label + 1])
         edges = self.ring_starts[first : last + 1].tolist()
-        return [self.points[start:end] for start, end in zip(edges[:-1], edges[1:], strict=True)]
+        return [self.points[start:end] for start, end in pairwise(edges)]
 
 
 def rings_of(labels: Sequence[Sequence[Float[np.ndarray, "k 2"]]]) -> Rings:
