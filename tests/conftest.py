@@ -47,6 +47,7 @@ install_import_hook(
             "projected_points",
             "convex_outlines",
             "rings",
+            "minimum_rectangles",
         )
     ],
     "beartype.beartype",
