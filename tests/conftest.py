@@ -45,6 +45,9 @@ install_import_hook(
             "hull_box",
             "mesh_silhouette",
             "projected_points",
+            "convex_outlines",
+            "rings",
+            "minimum_rectangles",
         )
     ],
     "beartype.beartype",

@@ -22,7 +22,7 @@ class Rings:
     """
 
     points: Float[np.ndarray, "m 2"]
-    ring_starts: Int[np.ndarray, "r+1"]
+    ring_starts: Int[np.ndarray, "r"]
     label_starts: Int[np.ndarray, "k"]
 
     def of(self, label: int) -> list[Float[np.ndarray, "k 2"]]:
