@@ -7,15 +7,17 @@ page's overlay, the pictures of a format and the writers all draw what they say.
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ars_web.datasets.samples import LabelTable, outlines_of_shapes
+from ars_web.datasets.shape_rings import rings_of_shapes
 from ars_web.datasets.shapes import PosedShapes
 from ars_web.errors import BadInput
+from ars_web.geometry.convex_outlines import convex_outlines, convex_outlines_of_boxes
+from ars_web.geometry.minimum_rectangles import minimum_rectangles
 from ars_web.geometry.projected_points import project_points
-from ars_web.geometry.rings import Rings, one_ring_each, rings_of
+from ars_web.geometry.rings import Rings, one_ring_each
 
 UNSEEN, HIDDEN, SEEN = 0, 1, 2
 """States of a keypoint, as COCO numbers them: not in the image; in it behind something, or on the object's far side;
@@ -64,36 +66,26 @@ def _box(shapes: PosedShapes, table: LabelTable, wanted: Bool[np.ndarray, "n b"]
 
 def _silhouette(shapes: PosedShapes, table: LabelTable, wanted: Bool[np.ndarray, "n b"]) -> Marks:
     """The border of the part in the image, pieces and holes included."""
-    found = _outlines(shapes, wanted)
-    return _rings_alone(found, wanted)
+    found = outlines_of_shapes(shapes, wanted)
+    return _rings_alone(one_ring_each(found.points, found.starts), wanted)
 
 
 def _convex(shapes: PosedShapes, table: LabelTable, wanted: Bool[np.ndarray, "n b"]) -> Marks:
     """The convex hull, in the image, of the part in it."""
-    return _rings_alone(_convex_rings(shapes, wanted), wanted)
+    return _rings_alone(one_ring_each(*_convex_rings(shapes, wanted)), wanted)
 
 
 def _rectangle(shapes: PosedShapes, table: LabelTable, wanted: Bool[np.ndarray, "n b"]) -> Marks:
     """The rectangle of the smallest area, turned as it may be, round the part in the image."""
-    rings = _convex_rings(shapes, wanted)
-    count = len(rings.label_starts) - 1
-    corners = [[cv2.boxPoints(cv2.minAreaRect(ring.astype(np.float32))) for ring in rings.of(i)] for i in range(count)]
-    return _rings_alone(rings_of(corners), wanted)
+    points, offsets = _convex_rings(shapes, wanted)
+    corners, drawn = minimum_rectangles(points, offsets), np.diff(offsets) > 0
+    return _rings_alone(one_ring_each(corners[drawn].reshape(-1, 2), np.cumsum([0, *(4 * drawn)])), wanted)
 
 
-def _outlines(shapes: PosedShapes, wanted: Bool[np.ndarray, "n b"]) -> Rings:
-    found = outlines_of_shapes(shapes, wanted)
-    return one_ring_each(found.points, found.starts)
-
-
-def _convex_rings(shapes: PosedShapes, wanted: Bool[np.ndarray, "n b"]) -> Rings:
-    outlines = _outlines(shapes, wanted)
-    count = len(outlines.label_starts) - 1
-    return rings_of([[_hull(ring) for ring in outlines.of(i)] for i in range(count)])
-
-
-def _hull(ring: Float[np.ndarray, "k 2"]) -> Float[np.ndarray, "m 2"]:
-    return cv2.convexHull(ring.astype(np.float32), clockwise=False)[:, 0].astype(np.float64)
+def _convex_rings(
+    shapes: PosedShapes, wanted: Bool[np.ndarray, "n b"]
+) -> tuple[Float[np.ndarray, "m 2"], Int[np.ndarray, "k"]]:
+    return rings_of_shapes(shapes, wanted, of_boxes=convex_outlines_of_boxes, of_meshes=convex_outlines)
 
 
 def _keypoints(shapes: PosedShapes, table: LabelTable, wanted: Bool[np.ndarray, "n b"]) -> Marks:

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ars_web.datasets.options import ExportOptions
+from ars_web.datasets.shape_rings import columns_of, rings_of_shapes
 from ars_web.datasets.shapes import PosedShapes, by_camera, check_shape, meshes_of
 from ars_web.errors import BadInput, NotFound
 from ars_web.geometry import labels as geometry
@@ -112,7 +113,7 @@ def labels_in_frames(
     """
     n, b = len(camera_ids), len(boxes)
     table = LabelTable(np.full((n, b, 4), np.nan), np.full((n, b, 4), np.nan), np.ones((n, b)), np.full((n, b), np.nan))
-    solids, plain = _columns(meshes, b)
+    solids, plain = columns_of(meshes or [None] * b)
     for camera, rows in by_camera(cameras, camera_ids):
         Ts = Ts_world_camera[rows]
         found: list[tuple[list[int], BoxLabels]] = []
@@ -144,9 +145,7 @@ def labels_of_shapes(shapes: PosedShapes, *, with_visible: bool = True, step: in
 
 def outlines_of_shapes(shapes: PosedShapes, wanted: Bool[np.ndarray, "n b"]) -> Outlines:
     """The outlines that `outlines_in_frames` draws, of shapes that know where they are seen from."""
-    return outlines_in_frames(
-        shapes.cameras, shapes.camera_ids, shapes.Ts_world_camera, shapes.boxes, wanted, meshes=shapes.meshes
-    )
+    return Outlines(*rings_of_shapes(shapes, wanted, of_boxes=geometry.outlines, of_meshes=mesh_outlines))
 
 
 def outlines_in_frames(
@@ -158,32 +157,10 @@ def outlines_in_frames(
     *,
     meshes: Meshes | None = None,
 ) -> Outlines:
-    """Outlines of the boxes, or their hulls, in the frames where they are wanted."""
-    if not wanted.any():
-        return Outlines(np.zeros((0, 2)), np.zeros(wanted.size + 1, dtype=np.int64))
-    lengths = np.zeros(wanted.shape, dtype=np.int64)
-    solids, plain = _columns(meshes, len(boxes))
-    found: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = []
-    for camera, rows in by_camera(cameras, camera_ids):
-        Ts = Ts_world_camera[rows]
-        if plain:
-            of_boxes = [boxes[i] for i in plain]
-            columns = np.array(plain)
-            found.append((rows, columns, *geometry.outlines(camera, Ts, of_boxes, wanted[np.ix_(rows, columns)])))
-        if solids:
-            columns = np.array(list(solids))
-            found.append(
-                (rows, columns, *mesh_outlines(camera, Ts, list(solids.values()), wanted[np.ix_(rows, columns)]))
-            )
-    for rows, columns, _, offsets in found:
-        lengths[np.ix_(rows, columns)] = np.diff(offsets).reshape(len(rows), len(columns))
-    starts = np.concatenate([[0], np.cumsum(lengths)])
-    joined = np.empty((starts[-1], 2))
-    for rows, columns, points, offsets in found:
-        # Where each ring's points go: as far from its start there as from its start here.
-        at = starts[:-1].reshape(wanted.shape)[np.ix_(rows, columns)].ravel()
-        joined[np.repeat(at - offsets[:-1], np.diff(offsets)) + np.arange(len(points))] = points
-    return Outlines(joined, starts)
+    """Outlines of the boxes, or their meshes, in the frames where they are wanted."""
+    none = np.zeros((len(boxes), 0, 3))
+    shapes = PosedShapes(cameras, camera_ids, Ts_world_camera, boxes, meshes or [None] * len(boxes), none)
+    return outlines_of_shapes(shapes, wanted)
 
 
 def label_table(
@@ -291,12 +268,6 @@ def preview_labels(
             )
         found.append(labels)
     return found
-
-
-def _columns(meshes: Meshes | None, b: int) -> tuple[dict[int, Mesh], list[int]]:
-    """The meshes by their column, and the columns without one."""
-    solids = {i: mesh for i, mesh in enumerate(meshes or ()) if mesh is not None}
-    return solids, [i for i in range(b) if i not in solids]
 
 
 def _bbox_or_none(bbox: Float[np.ndarray, "4"]) -> tuple[float, float, float, float] | None:
