@@ -48,6 +48,8 @@ install_import_hook(
             "convex_outlines",
             "rings",
             "minimum_rectangles",
+            "mesh_outlines",
+            "mesh_labels",
         )
     ],
     "beartype.beartype",

@@ -25,14 +25,14 @@ class Rings:
     ring_starts: Int[np.ndarray, "r"]
     label_starts: Int[np.ndarray, "k"]
 
-    def of(self, label: int) -> list[Float[np.ndarray, "k 2"]]:
+    def of(self, label: int) -> list[Float[np.ndarray, "_ 2"]]:
         """The rings of the label with this number, frame * b + shape."""
         first, last = int(self.label_starts[label]), int(self.label_starts[label + 1])
         edges = self.ring_starts[first : last + 1].tolist()
         return [self.points[start:end] for start, end in pairwise(edges)]
 
 
-def rings_of(labels: Sequence[Sequence[Float[np.ndarray, "k 2"]]]) -> Rings:
+def rings_of(labels: Sequence[Sequence[Float[np.ndarray, "_ 2"]]]) -> Rings:
     """The rings of each label, put one after the other."""
     every = [ring for rings in labels for ring in rings]
     return Rings(
