@@ -17,7 +17,7 @@ from ars_web.sessions.model import SessionSnapshot
 
 JPEG_QUALITY = 88
 
-FILLED = ("silhouette", "mask")
+FILLED = ("outline", "silhouette", "mask")
 """Label functions whose area is tinted, too."""
 
 MOST_TRIED = 60

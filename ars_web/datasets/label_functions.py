@@ -11,13 +11,15 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ars_web.datasets.samples import LabelTable, outlines_of_shapes
-from ars_web.datasets.shape_rings import rings_of_shapes
+from ars_web.datasets.shape_rings import columns_of, rings_of_shapes
 from ars_web.datasets.shapes import PosedShapes
 from ars_web.errors import BadInput
 from ars_web.geometry.convex_outlines import convex_outlines, convex_outlines_of_boxes
+from ars_web.geometry.labels import outlines
+from ars_web.geometry.mesh_outlines import mesh_regions
 from ars_web.geometry.minimum_rectangles import minimum_rectangles
 from ars_web.geometry.projected_points import project_points
-from ars_web.geometry.rings import Rings, one_ring_each
+from ars_web.geometry.rings import Rings, one_ring_each, rings_of
 
 UNSEEN, HIDDEN, SEEN = 0, 1, 2
 """States of a keypoint, as COCO numbers them: not in the image; in it behind something, or on the object's far side;
@@ -64,10 +66,26 @@ def _box(shapes: PosedShapes, table: LabelTable, wanted: Bool[np.ndarray, "n b"]
     return _rings_alone(one_ring_each(corners[drawn].reshape(-1, 2), np.cumsum([0, *(4 * drawn)])), wanted)
 
 
-def _silhouette(shapes: PosedShapes, table: LabelTable, wanted: Bool[np.ndarray, "n b"]) -> Marks:
-    """The border of the part in the image, pieces and holes included."""
+def _outline(shapes: PosedShapes, table: LabelTable, wanted: Bool[np.ndarray, "n b"]) -> Marks:
+    """The border of the part in the image as one ring, which goes to pieces and holes on lines that enclose nothing."""
     found = outlines_of_shapes(shapes, wanted)
     return _rings_alone(one_ring_each(found.points, found.starts), wanted)
+
+
+def _silhouette(shapes: PosedShapes, table: LabelTable, wanted: Bool[np.ndarray, "n b"]) -> Marks:
+    """The border of the part in the image, a ring for each of its pieces and holes."""
+    solids, plain = columns_of(shapes.meshes)
+    labels: list[list[Float[np.ndarray, "k 2"]]] = [[] for _ in range(wanted.size)]
+    for camera, rows in shapes.by_camera():
+        Ts = shapes.Ts_world_camera[rows]
+        for columns, rings in (
+            (plain, one_ring_each(*outlines(camera, Ts, [shapes.boxes[i] for i in plain], wanted[rows][:, plain]))),
+            (list(solids), mesh_regions(camera, Ts, list(solids.values()), wanted[rows][:, list(solids)])),
+        ):
+            places = (rows[:, None] * wanted.shape[1] + np.array(columns, dtype=np.int64)).ravel().tolist()
+            for number, place in enumerate(places):
+                labels[place] = rings.of(number)
+    return _rings_alone(rings_of(labels), wanted)
 
 
 def _convex(shapes: PosedShapes, table: LabelTable, wanted: Bool[np.ndarray, "n b"]) -> Marks:
@@ -112,6 +130,9 @@ LABEL_FUNCTIONS: dict[str, LabelFunction] = {
     for function in (
         LabelFunction("box", "Box", "the smallest upright rectangle round what is in the image", _box),
         LabelFunction("convex", "Convex outline", "the convex hull of what is in the image", _convex),
+        LabelFunction(
+            "outline", "Outline", "the border of what is in the image as one ring, as polygon formats hold it", _outline
+        ),
         LabelFunction("silhouette", "Silhouette", "the border of what is in the image, holes included", _silhouette),
         LabelFunction("rectangle", "Turned rectangle", "the rectangle of the smallest area", _rectangle),
         LabelFunction(

@@ -7,7 +7,7 @@ import httpx
 import numpy as np
 import pytest
 
-FUNCTIONS = ("box", "convex", "silhouette", "rectangle", "mask", "keypoints")
+FUNCTIONS = ("box", "convex", "outline", "silhouette", "rectangle", "mask", "keypoints")
 
 
 @pytest.fixture
@@ -73,4 +73,4 @@ def test_the_formats_say_how_they_are_drawn(client: httpx.Client) -> None:
     assert [function["name"] for function in found["label_functions"]] == list(FUNCTIONS)
     shows = {writer["format"]: writer["shows"] for writer in found["writers"]}
     assert shows["yolo"] == ["box"]
-    assert "silhouette" in shows["coco"]
+    assert "outline" in shows["coco"]

@@ -74,4 +74,4 @@ def _rounding(longer: int) -> float:
     return 0.0071
 
 
-READER = Reader(format="coco", library=_library, read=_read, rounding=_rounding, ring_function="silhouette")
+READER = Reader(format="coco", library=_library, read=_read, rounding=_rounding, ring_function="outline")
