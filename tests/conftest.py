@@ -50,6 +50,9 @@ install_import_hook(
             "minimum_rectangles",
             "mesh_outlines",
             "mesh_labels",
+            "two_sided",
+            "flat_mesh",
+            "box_mesh",
         )
     ],
     "beartype.beartype",
