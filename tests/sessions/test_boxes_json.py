@@ -76,6 +76,55 @@ def test_boxes_and_classes_are_written_as_the_contract_says(a_mesh: Callable[...
     }
 
 
+numbers = st.floats(-1e6, 1e6)
+
+
+@given(
+    st.tuples(numbers, numbers, numbers),
+    st.tuples(numbers, numbers, numbers, numbers).filter(lambda q: np.linalg.norm(q) > 1e-6),
+)
+def test_what_is_written_is_a_unit_quaternion_and_reads_as_the_same_place(
+    position: tuple[float, ...], wxyz: tuple[float, ...]
+):
+    given_box = BoxJson.model_validate({**GOOD, "T_world_box": {"position": position, "wxyz": wxyz}})
+    box = given_box.draft.box
+    written = json.loads(json.dumps(box_json(VirtualBox(1, 0, "b", box, 1))))
+    assert np.linalg.norm(written["T_world_box"]["wxyz"]) == pytest.approx(1, abs=1e-12)
+    assert written["T_world_box"]["wxyz"][0] >= 0
+    again = BoxJson.model_validate({key: written[key] for key in ("class_id", "T_world_box", "size")}).draft.box
+    assert np.abs(again.T_world_box - box.T_world_box).max() < 1e-9
+
+
+def test_a_files_boxes_are_what_the_api_answers(
+    store: SessionStore,
+    editor: SessionEditor,
+    sid: str,
+    a_box: Callable[..., Box],
+    a_hull: Callable[..., HullMesh],
+    tmp_path: Path,
+):
+    editor.add_box(sid, class_id=0, box=a_box(), name="left", author="me")
+    editor.add_box(sid, class_id=0, box=a_box(1.0), author="me")
+    editor.put_object(
+        sid, box_id=None, class_id=0, box=a_box(2.0), hull=a_hull(), hull_options=HullOptions("free", widen=1.5),
+        author="me",
+    )  # fmt: skip
+    listed = [box_json(box) for box in store.state(sid).boxes.values()]
+    assert (listed[2]["has_hull"], listed[2]["hull_options"]) == (
+        True, {"orientation": "free", "position": "box", "widen_px": 1.5, "ground": None, "fitted": False},
+    )  # fmt: skip
+    (tmp_path / "boxes.json").write_text(json.dumps(listed))
+    drafts = read_boxes_file(tmp_path / "boxes.json")
+    added = editor.add_boxes(sid, drafts, author="cli")
+    assert [box.hull for box in added] == [None, None, None]
+    for before, after in zip(listed, map(box_json, added), strict=True):
+        assert after["T_world_box"]["position"] == before["T_world_box"]["position"]
+        assert after["T_world_box"]["wxyz"] == pytest.approx(before["T_world_box"]["wxyz"], abs=1e-12)
+        assert {k: after[k] for k in ("class_id", "name", "size")} == {
+            k: before[k] for k in ("class_id", "name", "size")
+        }
+
+
 def test_a_byte_order_mark_and_missing_names_are_fine(tmp_path: Path):
     (tmp_path / "boxes.json").write_bytes(b"\xef\xbb\xbf" + json.dumps([GOOD]).encode())
     (draft,) = read_boxes_file(tmp_path / "boxes.json")
