@@ -7,8 +7,7 @@ from pydantic import BaseModel, Field
 from ars_web.geometry.keypoints import FARTHEST_KEYPOINT, LONGEST_KEYPOINT_NAME, MOST_KEYPOINTS, Keypoint
 from ars_web.geometry.symmetry import MOST_ROTATIONS, Symmetry
 from ars_web.meshes.placement import MeshOrigin, MeshUnit
-from ars_web.meshes.polygon import MOST_CORNERS
-from ars_web.sessions.boxes_json import Component, Coordinate, Strict, mesh_json
+from ars_web.sessions.boxes_json import Component, Strict, mesh_json
 from ars_web.sessions.object_mesh import SourcedMesh
 
 Axis = tuple[Component, Component, Component]
@@ -127,15 +126,6 @@ class BoxMeshFields(Strict):
     unit: MeshUnit
     axes: Annotated[str, Field(max_length=20)]
     origin: MeshOrigin = "centre"
-
-
-class PolygonDraft(Strict):
-    """A planar polygon that an object is."""
-
-    polygon: Annotated[
-        list[tuple[Coordinate, Coordinate, Coordinate]], Field(min_length=3, max_length=MOST_CORNERS)
-    ] = Field(description="its corners in order, metres; they lie in a plane, and the outline does not cross itself")
-    frame_of: Literal["box", "world"] = Field(description="whose coordinates they are in")
 
 
 def form_body(*, fit_size: bool) -> dict[str, Any]:

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from contextlib import ExitStack
 from typing import TypeVar
 
-import numpy as np
 from fastapi import APIRouter, Request, Response
 from pydantic import Field, ValidationError
 from starlette.concurrency import run_in_threadpool
@@ -18,7 +17,7 @@ from ars_web.api.dependencies import (
     StrictRoute,
     etag,
 )
-from ars_web.api.mesh_models import BoxMeshFields, MeshFields, MeshJson, MeshSurface, PolygonDraft, form_body
+from ars_web.api.mesh_models import BoxMeshFields, MeshFields, MeshJson, MeshSurface, form_body
 from ars_web.api.models import BoxAnswer, ClassAnswer
 from ars_web.api.multipart_form import MultipartForm
 from ars_web.api.problems import documented
@@ -28,6 +27,7 @@ from ars_web.sessions.boxes_json import box_json, class_json, mesh_json
 from ars_web.sessions.drafting import box_at
 from ars_web.sessions.mesh_reading import object_from_file, object_from_polygon
 from ars_web.sessions.object_mesh import SourcedMesh
+from ars_web.sessions.polygon_json import PolygonJson
 from ars_web.sessions.session_folders import unseen_folder
 
 router = APIRouter(prefix="/api/sessions/{sid}", tags=["meshes"], route_class=StrictRoute)
@@ -125,7 +125,7 @@ async def put_box_mesh(
 def put_polygon(
     sid: str,
     box_id: int,
-    draft: PolygonDraft,
+    draft: PolygonJson,
     response: Response,
     services: ServicesDep,
     author: AuthorDep,
@@ -134,7 +134,7 @@ def put_polygon(
     """Have the object in a box, which is at the revision in `If-Match`, be a planar polygon: a mesh of its own that is
     seen from both sides. Corners a little off their plane are moved into it."""
     box = box_at(services.store.state(sid), box_id, expected)
-    mesh = object_from_polygon(np.array(draft.polygon), box.box, in_world=draft.frame_of == "world")
+    mesh = object_from_polygon(draft.corners, box.box, in_world=draft.frame_of == "world")
     return _give(services, response, sid, box_id, mesh, [], expected, author)
 
 
