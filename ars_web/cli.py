@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ars_web import arguments as take
-from ars_web import box_commands, kernel_cache
+from ars_web import box_commands, class_commands, kernel_cache
 from ars_web.errors import ArsError
 from ars_web.terminal import has_screen, note, open_browser, print_json, print_table, progress
 
@@ -41,6 +41,7 @@ app = typer.Typer(
     context_settings={"max_content_width": 120},
 )
 app.add_typer(box_commands.app, name="boxes")
+app.add_typer(class_commands.app, name="classes")
 
 
 @app.callback(invoke_without_command=True)

@@ -1,5 +1,7 @@
 """No request makes the server hold more than it agreed to."""
 
+import re
+
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -7,6 +9,9 @@ from ars_web.api.problems import ProblemResponse
 
 UPLOAD_PATHS = frozenset({"/api/sessions/upload", "/api/imports/uploads"})
 """Read piece by piece by their handlers, which count for themselves."""
+
+MESH_PATHS = re.compile(r"/api/sessions/[^/]+/(?:classes|boxes)/[^/]+/mesh")
+"""The same, where they are sent."""
 
 
 class BodyLimit:
@@ -18,7 +23,7 @@ class BodyLimit:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass on with the body in hand, or answer 413."""
-        if scope["type"] != "http" or scope["path"] in UPLOAD_PATHS:
+        if scope["type"] != "http" or _counts_itself(scope["path"]):
             await self.app(scope, receive, send)
             return
         declared = Headers(scope=scope).get("content-length", "0")
@@ -42,3 +47,7 @@ class BodyLimit:
             return held.pop() if held else await receive()
 
         await self.app(scope, replay, send)
+
+
+def _counts_itself(path: str) -> bool:
+    return path in UPLOAD_PATHS or MESH_PATHS.fullmatch(path) is not None
