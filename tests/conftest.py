@@ -44,6 +44,7 @@ install_import_hook(
             "visual_hull",
             "hull_box",
             "mesh_silhouette",
+            "resting_objects",
         )
     ],
     "beartype.beartype",
@@ -103,6 +104,12 @@ def _beside(name: str) -> ModuleType:
 def ring_scene() -> ModuleType:
     """`ring_scene.py`: a recording round an object, with the object's outlines."""
     return _beside("ring_scene")
+
+
+@pytest.fixture(scope="session")
+def bop_scene() -> ModuleType:
+    """`bop_scene.py`: the ring of cameras as a BOP dataset, with objects."""
+    return _beside("bop_scene")
 
 
 @pytest.fixture(scope="session")
