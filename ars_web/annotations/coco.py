@@ -33,6 +33,9 @@ from ars_web.recordings.options import ReadOptions
 TITLE = "COCO instances"
 NEEDS = "a JSON file with images, annotations and categories"
 
+PARTS = "instances_"
+"""How names of files begin that are parts of one set: instances_train.json, instances_val.json."""
+
 _CROWD = (
     "it is marked as a crowd (iscrowd), which is several objects in one outline; where it is one, set iscrowd to 0 or"
     " give it a track_id"

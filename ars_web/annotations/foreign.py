@@ -1,7 +1,7 @@
 """What a file of labels holds, whatever its format: converted to metres and image coordinates, and checked."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -146,3 +146,36 @@ class ForeignLabels:
     outlines: tuple[ForeignOutline, ...] = ()
     rectangles: tuple[ForeignRectangle, ...] = ()
     left_out: tuple[LeftOut, ...] = ()
+
+
+def joined(source: Path, parts: Sequence[ForeignLabels]) -> ForeignLabels:
+    """The parts of one set, one or more, which was divided by images; objects and classes are the same in all.
+
+    Args:
+        source: what the whole set was read from.
+    """
+    if len(parts) == 1:
+        return parts[0]
+    images: list[ForeignImage] = []
+    outlines: list[ForeignOutline] = []
+    rectangles: list[ForeignRectangle] = []
+    poses: list[ForeignPose] = []
+    left_out: list[LeftOut] = []
+    for part in parts:
+        first, name = len(images), part.source.name
+        images.extend(part.images)
+        poses.extend(replace(p, image=first + p.image, where=f"{name}, {p.where}") for p in part.poses)
+        outlines.extend(replace(o, image=first + o.image, where=f"{name}, {o.where}") for o in part.outlines)
+        rectangles.extend(replace(r, image=first + r.image, where=f"{name}, {r.where}") for r in part.rectangles)
+        left_out.extend(replace(one, where=f"{name}, {one.where}") for one in part.left_out)
+    models = {key: model for part in parts for key, model in part.models.items()}
+    return ForeignLabels(
+        parts[0].format,
+        source,
+        tuple(images),
+        models,
+        tuple(poses),
+        tuple(outlines),
+        tuple(rectangles),
+        tuple(left_out),
+    )

@@ -78,9 +78,7 @@ def planned_labels(labels: ForeignLabels, frames: FrameTable, cameras: Mapping[i
     return LabelPlan((*posed, *seen), (*labels.left_out, *unplaced, *unseen), matching.notes)
 
 
-def _posed(
-    labels: ForeignLabels, matching: Matching, frames: FrameTable
-) -> tuple[list[PlannedObject], list[LeftOut]]:
+def _posed(labels: ForeignLabels, matching: Matching, frames: FrameTable) -> tuple[list[PlannedObject], list[LeftOut]]:
     """The objects that poses are of, by the session's cameras."""
     objects: list[PlannedObject] = []
     left_out = [matching.left_out(p.image, p.where) for p in labels.poses if p.image not in matching.frames]
@@ -127,7 +125,7 @@ def _seen(
         drawn: dict[int, tuple[Polygon, ...]] = {}
         boxed: dict[int, np.ndarray] = {}
         wheres: dict[int, str] = {}
-        for frame, pieces in _by_frame(by_object.get(key, ()), matching).items():
+        for frame, pieces in _by_frame(by_object.get(key, []), matching).items():
             camera = cameras[int(frames.camera_ids[frame])]
             try:
                 drawn[frame] = checked_polygons(_joined(pieces), width=camera.width, height=camera.height)
@@ -135,7 +133,7 @@ def _seen(
                 left_out.extend(LeftOut(str(error), piece.where) for piece in pieces)
             else:
                 wheres[frame] = pieces[0].where
-        for frame, pieces in _by_frame(rectangles_by_object.get(key, ()), matching).items():
+        for frame, pieces in _by_frame(rectangles_by_object.get(key, []), matching).items():
             if frame not in drawn:
                 boxed[frame] = pieces[0].bbox
                 wheres[frame] = pieces[0].where
