@@ -24,13 +24,15 @@ from ars_web.recordings.options import ReadOptions
 TITLE = "BOP scene"
 NEEDS = "scene_gt.json, scene_camera.json beside it, and a models_info.json in models/ beside or above the scene"
 
+_DEPTHS = ("", "*/", "*/*/")
+
 _NO_MODEL = f"its size is not known: its obj_id is not in a {MODELS_FILE} in models/ beside or above the scene"
 
 
 def find(path: Path) -> list[Path]:
-    """The scene's scene_gt.json."""
+    """The scene's scene_gt.json; in a dataset's folder those of its scenes."""
     if path.is_dir():
-        return [path / TRUTH_FILE] if (path / TRUTH_FILE).is_file() else []
+        return next((files for depth in _DEPTHS if (files := sorted(path.glob(f"{depth}{TRUTH_FILE}")))), [])
     return [path] if path.name == TRUTH_FILE or holds_words(path, (b'"cam_R_m2c"', b'"obj_id"')) else []
 
 

@@ -36,6 +36,8 @@ NEEDS = "a JSON file with images, annotations and categories"
 PARTS = "instances_"
 """How names of files begin that are parts of one set: instances_train.json, instances_val.json."""
 
+_OF_BOP = "scene_gt"
+
 _CROWD = (
     "it is marked as a crowd (iscrowd), which is several objects in one outline; where it is one, set iscrowd to 0 or"
     " give it a track_id"
@@ -102,7 +104,8 @@ def find(path: Path) -> list[Path]:
     """The JSON files of instances at `path`, in the folder or in its annotations/."""
     if path.is_dir():
         files = [*sorted(path.glob("*.json")), *sorted(path.glob("annotations/*.json"))]
-        return [file for file in files if _is_one(file)]
+        # A BOP scene has its boxes as COCO, too, which say less than its poses.
+        return [file for file in files if not file.name.startswith(_OF_BOP) and _is_one(file)]
     return [path] if _is_one(path) else []
 
 
