@@ -168,7 +168,10 @@ def _polygons(segmentation: object, image: _Image) -> tuple[Polygon, ...] | None
         return None
     if isinstance(segmentation, Mapping):
         runs = cast("Mapping[str, object]", segmentation)
-        height, width = _whole(runs.get("size"), "the size of a mask, height and width,")[:2]
+        size = _whole(runs.get("size"), "the size of a mask, height and width,")
+        if len(size) != 2:
+            raise BadInput(f"the size of a mask is its height and width, not {size}")
+        height, width = size
         if (image.width or width, image.height or height) != (width, height):
             raise BadInput(
                 f"its mask has {width} x {height} pixels, its image {image.width} x {image.height}: the size of a"
@@ -200,7 +203,7 @@ def _numbers(given: object, what: str) -> list[float]:
         for value in numbers
         if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= _LARGEST
     ]
-    if len(found) < 2 or len(found) != len(numbers):
+    if not found or len(found) != len(numbers):
         raise BadInput(f"{what} must be a list of numbers up to {_LARGEST:g}, not {str(given)[:60]}")
     return found
 
