@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ars_web import arguments as take
-from ars_web import box_commands, class_commands, kernel_cache
+from ars_web import box_commands, class_commands, kernel_cache, label_commands
 from ars_web.errors import ArsError
 from ars_web.terminal import has_screen, note, open_browser, print_json, print_table, progress
 
@@ -42,6 +42,7 @@ app = typer.Typer(
 )
 app.add_typer(box_commands.app, name="boxes")
 app.add_typer(class_commands.app, name="classes")
+app.add_typer(label_commands.app, name="labels")
 
 
 @app.callback(invoke_without_command=True)
@@ -320,12 +321,14 @@ def unpack(
 
 @app.command()
 def formats(as_json: take.Json = False) -> None:
-    """The formats that recordings come in and datasets go out."""
+    """The formats that recordings and labels come in and datasets go out."""
+    from ars_web.annotations.registry import READERS as LABEL_READERS
     from ars_web.datasets.registry import WRITERS
     from ars_web.recordings.registry import READERS
 
     rows = [
         *(("import", reader.format, f"{reader.title}: {reader.needs}") for reader in READERS.values()),
+        *(("labels", reader.format, f"{reader.title}: {reader.needs}") for reader in LABEL_READERS.values()),
         *(("export", writer.format, writer.title) for writer in WRITERS.values()),
     ]
     if as_json:

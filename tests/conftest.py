@@ -53,6 +53,7 @@ install_import_hook(
             "two_sided",
             "flat_mesh",
             "box_mesh",
+            "resting_objects",
         )
     ],
     "beartype.beartype",
@@ -112,6 +113,12 @@ def _beside(name: str) -> ModuleType:
 def ring_scene() -> ModuleType:
     """`ring_scene.py`: a recording round an object, with the object's outlines."""
     return _beside("ring_scene")
+
+
+@pytest.fixture(scope="session")
+def bop_scene() -> ModuleType:
+    """`bop_scene.py`: the ring of cameras as a BOP dataset, with objects."""
+    return _beside("bop_scene")
 
 
 @pytest.fixture(scope="session")

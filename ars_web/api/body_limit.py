@@ -7,11 +7,10 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from ars_web.api.problems import ProblemResponse
 
-UPLOAD_PATHS = frozenset({"/api/sessions/upload", "/api/imports/uploads"})
-"""Read piece by piece by their handlers, which count for themselves."""
-
-MESH_PATHS = re.compile(r"/api/sessions/[^/]+/(?:classes|boxes)/[^/]+/mesh")
-"""The same, where they are sent."""
+UPLOADS = re.compile(
+    r"/api/(?:sessions/upload|imports/uploads|sessions/[^/]+/(?:labels/upload|(?:classes|boxes)/[^/]+/mesh))"
+)
+"""Paths that are read piece by piece by their handlers, which count for themselves."""
 
 
 class BodyLimit:
@@ -23,7 +22,7 @@ class BodyLimit:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass on with the body in hand, or answer 413."""
-        if scope["type"] != "http" or _counts_itself(scope["path"]):
+        if scope["type"] != "http" or UPLOADS.fullmatch(scope["path"]):
             await self.app(scope, receive, send)
             return
         declared = Headers(scope=scope).get("content-length", "0")
@@ -47,7 +46,3 @@ class BodyLimit:
             return held.pop() if held else await receive()
 
         await self.app(scope, replay, send)
-
-
-def _counts_itself(path: str) -> bool:
-    return path in UPLOAD_PATHS or MESH_PATHS.fullmatch(path) is not None

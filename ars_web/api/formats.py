@@ -5,6 +5,7 @@ from typing import Any
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
+from ars_web.annotations.registry import READERS as LABEL_READERS
 from ars_web.api.dependencies import StrictRoute
 from ars_web.api.problems import documented
 from ars_web.datasets.label_functions import LABEL_FUNCTIONS
@@ -17,7 +18,7 @@ router = APIRouter(prefix="/api/formats", tags=["formats"], route_class=StrictRo
 
 
 class ReaderJson(BaseModel):
-    """A format that recordings come in."""
+    """A format that recordings or labels come in."""
 
     format: str
     title: str
@@ -68,16 +69,18 @@ class FormatsJson(BaseModel):
     """All formats, in the order in which they are offered."""
 
     readers: list[ReaderJson]
+    labels: list[ReaderJson] = Field(description="that labels beside a recording come in")
     writers: list[WriterJson]
     label_functions: list[LabelFunctionJson]
 
 
 @router.get("", operation_id="formats-list", responses=documented())
 def formats() -> FormatsJson:
-    """The formats of recordings and of datasets, with the options of exports in words."""
+    """The formats of recordings, labels and datasets, with the options of exports in words."""
     options = [OptionJson.model_validate(option, from_attributes=True) for option in export_options()]
     return FormatsJson(
         readers=[ReaderJson(format=r.format, title=r.title, needs=r.needs) for r in READERS.values()],
+        labels=[ReaderJson(format=r.format, title=r.title, needs=r.needs) for r in LABEL_READERS.values()],
         writers=[
             WriterJson(
                 format=w.format,

@@ -34,10 +34,11 @@ from ars_web.sessions.drafting import (
 from ars_web.sessions.edit_json import request_digest
 from ars_web.sessions.edits import BoxChange, Change, ClassChange, Edit, MaskChange, NameChange, inverse, restated
 from ars_web.sessions.history import LogEntry, to_redo, to_undo
+from ars_web.sessions.label_editing import LabelEditing
 from ars_web.sessions.model import ObjectClass, SessionState, SessionSummary, VirtualBox
 from ars_web.sessions.names import FreshNames, checked_name
 from ars_web.sessions.object_drafting import MaskDraft, reclassed
-from ars_web.sessions.object_editing import ObjectEditing, first_box
+from ars_web.sessions.object_editing import first_box
 from ars_web.sessions.object_mesh import SourcedMesh
 from ars_web.sessions.palette import checked_color, next_color
 from ars_web.sessions.sizes import checked_class_size
@@ -50,7 +51,7 @@ class NothingToUndo(BadInput):
     """The author has no edit to take back, or none to make again."""
 
 
-class SessionEditor(ObjectEditing):
+class SessionEditor(LabelEditing):
     """Changes sessions, for any number of threads; other processes may change the same sessions meanwhile.
 
     Every method raises NotFound for an unknown session and StoreError where the edit cannot be kept. Methods with

@@ -1,0 +1,75 @@
+"""The objects of a BOP scene: scene_gt.json, with models_info.json for their boxes.
+
+A pose is of the model's frame, in millimetres; the box's centre in it is the middle of models_info.json's bounds. The
+world that scene_camera.json may have plays no part: where the cameras were is the session's to say.
+"""
+
+from pathlib import Path
+
+from ars_web.annotations.foreign import ForeignImage, ForeignLabels, ForeignModel, ForeignPose, LeftOut
+from ars_web.errors import BadFile
+from ars_web.recordings.bop_scene import (
+    CAMERA_FILE,
+    MODELS_FILE,
+    TRUTH_FILE,
+    find_models,
+    object_poses,
+    read_cameras,
+    read_models,
+    read_truth,
+)
+from ars_web.recordings.json_file import holds_words
+from ars_web.recordings.options import ReadOptions
+
+TITLE = "BOP scene"
+NEEDS = "scene_gt.json, scene_camera.json beside it, and a models_info.json in models/ beside or above the scene"
+
+_DEPTHS = ("", "*/", "*/*/")
+
+_NO_MODEL = f"its size is not known: its obj_id is not in a {MODELS_FILE} in models/ beside or above the scene"
+
+
+def find(path: Path) -> list[Path]:
+    """The scene's scene_gt.json; in a dataset's folder those of its scenes."""
+    if path.is_dir():
+        return next((files for depth in _DEPTHS if (files := sorted(path.glob(f"{depth}{TRUTH_FILE}")))), [])
+    return [path] if path.name == TRUTH_FILE or holds_words(path, (b'"cam_R_m2c"', b'"obj_id"')) else []
+
+
+def read(file: Path, options: ReadOptions) -> ForeignLabels:
+    """Read a scene_gt.json.
+
+    Raises:
+        BadFile: a file is damaged, or scene_camera.json has no entry for an image with objects.
+        RefusedPath: something lies outside `options.within`.
+    """
+    truth = read_truth(file)
+    camera_file = options.allowed(file.parent / CAMERA_FILE)
+    cameras = read_cameras(camera_file) if camera_file.is_file() else {}
+    objects = [(number, i, one) for number, them in truth.items() for i, one in enumerate(them)]
+    Ts_camera_model = object_poses(file, objects)
+    models_file = find_models(file.parent, options)
+    models = {} if models_file is None else read_models(models_file)
+    images: list[ForeignImage] = []
+    places: dict[int, int] = {}
+    for number in truth:
+        K = None
+        if camera_file.is_file():
+            if number not in cameras:
+                raise BadFile(camera_file, f"has no image {number}, of which {file.name} has objects")
+            fx, _, cx, _, fy, cy, *_ = cameras[number].cam_K
+            K = (fx, fy, cx, cy)
+        places[number] = len(images)
+        images.append(ForeignImage(number=number, K=K))
+    poses: list[ForeignPose] = []
+    left_out: list[LeftOut] = []
+    for (number, i, one), T in zip(objects, Ts_camera_model, strict=True):
+        where = f"image {number}, object {i} (obj_id {one.obj_id})"
+        if one.obj_id in models:
+            poses.append(ForeignPose(places[number], models[one.obj_id].class_name, T, where))
+        else:
+            left_out.append(LeftOut(_NO_MODEL, where))
+    kinds = {
+        m.class_name: ForeignModel(m.class_name, m.size, m.T_model_box, m.rotations, m.axis) for m in models.values()
+    }
+    return ForeignLabels("bop", file, tuple(images), kinds, tuple(poses), left_out=tuple(left_out))
