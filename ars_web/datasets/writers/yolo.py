@@ -73,7 +73,13 @@ def _write(shard: Shard, files: Path, fragments: Path) -> FileDigests:
     return write_files(files, folders, [f"{stem}.txt" for stem in shard.stems], buffer.data, starts)
 
 
-def _join(dataset: Dataset, fragments: Sequence[Path], folder: Path) -> FileDigests:
+def write_layout(dataset: Dataset, fragments: Sequence[Path], folder: Path) -> FileDigests:
+    """The folders of each split, and `data.yaml`."""
+    return write_layout_with(dataset, folder, ())
+
+
+def write_layout_with(dataset: Dataset, folder: Path, more: Sequence[str]) -> FileDigests:
+    """The same with further lines at the end of `data.yaml`."""
     for split in dataset.splits:
         (folder / "images" / split).mkdir(parents=True, exist_ok=True)
         (folder / "labels" / split).mkdir(parents=True, exist_ok=True)
@@ -81,7 +87,7 @@ def _join(dataset: Dataset, fragments: Sequence[Path], folder: Path) -> FileDige
     lines += ["names:", *(f"  {i}: {quoted(name)}" for i, name in enumerate(dataset.class_names))]
     if not dataset.class_names:
         lines[-1] = "names: {}"
-    (folder / "data.yaml").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    (folder / "data.yaml").write_text("\n".join([*lines, *more]) + "\n", encoding="utf-8")
     return {}
 
 
@@ -105,5 +111,5 @@ WRITER = Writer(
     label_folder="labels",
     image_folder=lambda split: f"images/{split}",
     write=_write,
-    join=_join,
+    join=write_layout,
 )
