@@ -1,6 +1,6 @@
 """The dataset formats by name. Adding one is one file and one line here."""
 
-from ars_web.datasets.writers import ars, coco, voc, yolo, yolo_obb, yolo_seg
+from ars_web.datasets.writers import ars, coco, voc, yolo, yolo_obb, yolo_pose, yolo_seg
 from ars_web.datasets.writers.writer import Writer
 from ars_web.errors import BadInput
 
@@ -10,6 +10,7 @@ WRITERS: dict[str, Writer] = {
         yolo.WRITER,
         yolo_seg.WRITER,
         yolo_obb.WRITER,
+        yolo_pose.WRITER,
         coco.WRITER,
         voc.WRITER,
         ars.WRITER,

@@ -1,6 +1,6 @@
 """How each format is read back. Adding one is one file and one line here."""
 
-from ars_web.datasets.readback import ars, coco, voc, yolo, yolo_obb, yolo_seg
+from ars_web.datasets.readback import ars, coco, voc, yolo, yolo_obb, yolo_pose, yolo_seg
 from ars_web.datasets.readback.reader import Reader
 from ars_web.errors import BadInput
 
@@ -10,6 +10,7 @@ READERS: dict[str, Reader] = {
         yolo.READER,
         yolo_seg.READER,
         yolo_obb.READER,
+        yolo_pose.READER,
         coco.READER,
         voc.READER,
         ars.READER,
