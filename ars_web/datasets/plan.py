@@ -46,7 +46,7 @@ def plan_export(
 
     Raises:
         BadInput: the format or the shape is unknown or cannot be made, `out` is in use, a frame or a session is
-            chosen that is not there, or no frame at all.
+            chosen that is not there, or no frame at all, or the format can hold nothing of the sessions.
         BadFile: a source image is missing, or has become a link.
     """
     writer = writer_of(format)
@@ -86,7 +86,10 @@ def plan_export(
     )
     most_boxes = max(len(session.boxes) for session in sessions)
     length = frames_per_shard or _frames_per_shard(len(frames), most_boxes, options.images)
-    return ExportPlan(out, format, options, classes, sessions, frames, _shards(counts, length))
+    plan = ExportPlan(out, format, options, classes, sessions, frames, _shards(counts, length))
+    # What the format cannot hold at all is refused now, not after the work.
+    writer.losses(plan)
+    return plan
 
 
 def check_merged(snapshots: Sequence[SessionSnapshot]) -> None:

@@ -1,10 +1,21 @@
 """The dataset formats by name. Adding one is one file and one line here."""
 
-from ars_web.datasets.writers import ars, coco, voc, yolo
+from ars_web.datasets.writers import ars, coco, voc, yolo, yolo_obb, yolo_pose, yolo_seg
 from ars_web.datasets.writers.writer import Writer
 from ars_web.errors import BadInput
 
-WRITERS: dict[str, Writer] = {writer.format: writer for writer in (yolo.WRITER, coco.WRITER, voc.WRITER, ars.WRITER)}
+WRITERS: dict[str, Writer] = {
+    writer.format: writer
+    for writer in (
+        yolo.WRITER,
+        yolo_seg.WRITER,
+        yolo_obb.WRITER,
+        yolo_pose.WRITER,
+        coco.WRITER,
+        voc.WRITER,
+        ars.WRITER,
+    )
+}
 """In the order in which they are offered."""
 
 

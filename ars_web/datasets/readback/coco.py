@@ -59,11 +59,16 @@ def _index(path: Path) -> tuple[list[dict[str, Any]], dict[int, str], dict[int, 
 def _label(names: dict[int, str], annotation: dict[str, Any]) -> ReadLabel:
     x, y, w, h = annotation["bbox"]
     ax, ay, aw, ah = annotation["amodal_bbox"]
+    keypoints = np.array(annotation["keypoints"], dtype=np.float64).reshape(-1, 3)
+    states = keypoints[:, 2].astype(np.int64)
     return ReadLabel(
         names[annotation["category_id"]],
         bbox=np.array([x, y, x + w, y + h]),
         bbox_amodal=np.array([ax, ay, ax + aw, ay + ah]),
         rings=tuple(np.array(ring).reshape(-1, 2) for ring in annotation["segmentation"]),
+        # Keypoints are indices of pixels, whose centres are half a pixel further.
+        points=np.where((states > 0)[:, None], keypoints[:, :2] + 0.5, np.nan),
+        states=states,
         visible=annotation["visible"],
         truncated=annotation["truncated"],
     )

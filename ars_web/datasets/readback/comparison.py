@@ -8,10 +8,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 import shapely
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from ars_web.datasets.counting import Selection, select_labels
-from ars_web.datasets.label_functions import Marks, label_function
+from ars_web.datasets.label_functions import UNSEEN, Marks, label_function
 from ars_web.datasets.planned import ExportPlan
 from ars_web.datasets.readback.reader import ReadFrame, ReadLabel
 from ars_web.datasets.readback.registry import reader_of
@@ -43,6 +43,7 @@ class Comparison:
         wrong_counts: frames with more labels or fewer than planned.
         wrong_classes: labels of another class than planned.
         wrong_splits: frames in another split than planned.
+        wrong_states: keypoints that are said to be in sight, hidden or out of the image and are not.
         largest_error: pixels between what was read and what the session says, of all boxes, rings, points and poses.
         rounding: pixels that the format's own digits may cost.
         where: the place of the largest error; empty where there is none.
@@ -57,6 +58,7 @@ class Comparison:
     wrong_counts: int
     wrong_classes: int
     wrong_splits: int
+    wrong_states: int
     largest_error: float
     rounding: float
     where: str
@@ -65,7 +67,8 @@ class Comparison:
     @property
     def differing(self) -> int:
         """Counts that differ, all together."""
-        return self.missing_frames + self.unknown_frames + self.wrong_counts + self.wrong_classes + self.wrong_splits
+        frames = self.missing_frames + self.unknown_frames + self.wrong_counts + self.wrong_splits
+        return frames + self.wrong_classes + self.wrong_states
 
     @property
     def agrees(self) -> bool:
@@ -85,7 +88,7 @@ class _Tally:
     """What is counted on the way."""
 
     def __init__(self) -> None:
-        self.frames = self.labels = self.unknown = self.counts = self.classes = self.splits = 0
+        self.frames = self.labels = self.unknown = self.counts = self.classes = self.splits = self.states = 0
         self.error, self.where, self.rounding = 0.0, "", 0.0
         self.examples: list[str] = []
 
@@ -136,6 +139,7 @@ def compare(plan: ExportPlan, folder: Path) -> Comparison:
         wrong_counts=tally.counts,
         wrong_classes=tally.classes,
         wrong_splits=tally.splits,
+        wrong_states=tally.states,
         largest_error=tally.error,
         rounding=reader.rounding(longest),
         where=tally.where,
@@ -157,6 +161,7 @@ def _compare_frames(
     selection = select_labels(plan, np.array(rows), with_visible=False)
     wanted, asked = selection.keep, [label for frame in frames for label in frame.labels]
     rings = _marks(selection, ring_function) if any(label.rings is not None for label in asked) else None
+    points = _marks(selection, "keypoints") if any(label.states is not None for label in asked) else None
     session = plan.sessions[int(plan.frames.session[rows[0]])]
     for i, (row, frame) in enumerate(zip(rows, frames, strict=True)):
         tally.frames += 1
@@ -181,6 +186,11 @@ def _compare_frames(
             if label.class_name != name:
                 tally.classes += 1
                 tally.say(f"{place}: {label.class_name!r}, not {name!r}")
+            if label.states is not None and points is not None:
+                wrong = _differing(label.states, points.states[i, column])
+                tally.states += wrong
+                if wrong:
+                    tally.say(f"{place}: the states of {wrong} keypoints differ")
             for error in _errors(selection, i, column, camera, label):
                 tally.measure(error, place)
             if label.rings is not None and rings is not None:
@@ -201,12 +211,22 @@ def _errors(selection: Selection, frame: int, column: int, camera: Camera, label
             yield float(np.abs(read - true[frame, column]).max())
     T_world_camera = shapes.Ts_world_camera[frame]
     if label.points is not None:
-        true = reprojected(camera, T_world_camera, shapes.keypoints_world[column])
+        # A class's points may be filled up to those of another with points that are not held.
+        true = np.full_like(label.points, np.nan)
+        known = reprojected(camera, T_world_camera, shapes.keypoints_world[column])[: len(true)]
+        true[: len(known)] = known
         held = ~np.isnan(label.points[:, 0])
-        yield float(np.abs(label.points - true[: len(held)])[held].max(initial=0.0))
+        yield float(np.abs(label.points - true)[held].max(initial=0.0))
     if label.T_camera_box is not None and label.size is not None:
         read = Box(T_world_camera @ label.T_camera_box, label.size)
         yield pose_error(camera, T_world_camera, read, shapes.boxes[column])
+
+
+def _differing(read: Int[np.ndarray, "k"], true: Int[np.ndarray, "m"]) -> int:
+    """How many states differ; those that only one of the two has are UNSEEN in the other."""
+    both = np.full((2, max(len(read), len(true))), UNSEEN)
+    both[0, : len(read)], both[1, : len(true)] = read, true
+    return int((both[0] != both[1]).sum())
 
 
 def pose_error(camera: Camera, T_world_camera: Transform, read: Box, true: Box) -> float:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from ars_web.geometry.rigid_transform import Transform
 
@@ -27,6 +27,7 @@ class ReadLabel:
         bbox, bbox_amodal: (x0, y0, x1, y1).
         rings: of the format's label function, see `Reader.ring_function`.
         points: (k, 2) keypoints, NaN where it holds none.
+        states: (k,) of the keypoints, as `label_functions.UNSEEN` and its neighbours number them.
         T_camera_box: place of the box's centre and its axes before the camera, OpenCV's.
         size: (3,) metres.
         mask, visible_mask: of all of the object in the image, and of what is seen of it.
@@ -38,6 +39,7 @@ class ReadLabel:
     bbox_amodal: Float[np.ndarray, "4"] | None = None
     rings: tuple[Float[np.ndarray, "k 2"], ...] | None = None
     points: Float[np.ndarray, "k 2"] | None = None
+    states: Int[np.ndarray, "k"] | None = None
     T_camera_box: Transform | None = None
     size: Float[np.ndarray, "3"] | None = None
     mask: ReadMask | None = None

@@ -15,13 +15,16 @@ def names_of(folder: Path) -> tuple[list[str], list[str]]:
     path = folder / "data.yaml"
     names: list[str] = []
     splits: list[str] = []
+    block = ""
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
         key, _, value = line.partition(": ")
-        if line.startswith("  ") and key.strip().isdigit():
+        if not line.startswith("  "):
+            block = key.rstrip(":")
+        elif block == "names" and key.strip().isdigit():
             if int(key) != len(names):
                 raise BadFile(path, f"class {key.strip()} comes after class {len(names) - 1}", line=number)
             names.append(unquoted(value))
-        elif key in ("train", "val", "test"):
+        if key in ("train", "val", "test"):
             splits.append(key)
     return names, splits
 

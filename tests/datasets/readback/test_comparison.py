@@ -91,6 +91,26 @@ def test_a_frame_in_another_split_is_counted(written: Callable[..., ExportPlan])
     assert (found.wrong_splits, found.agrees) == (1, False)
 
 
+def test_a_keypoint_that_is_off_or_of_another_state_is_told(written: Callable[..., ExportPlan]) -> None:
+    plan = written("yolo-pose")
+    path = labelled(plan.out / "labels")
+    first, *rest = path.read_text().splitlines()
+    words = first.split()
+    at = next(i for i in range(5, len(words), 3) if words[i + 2] != "0")
+
+    def changed(place: int, word: str) -> Comparison:
+        path.write_text("\n".join([" ".join([*words[:place], word, *words[place + 1 :]]), *rest]) + "\n")
+        return compare(plan, plan.out)
+
+    moved = changed(at, f"{float(words[at]) + 0.01:.6f}")
+    assert (moved.differing, moved.agrees) == (0, False)
+    assert moved.largest_error > 0.4
+    hidden = changed(at + 2, "1" if words[at + 2] == "2" else "2")
+    assert (hidden.wrong_states, hidden.differing, hidden.agrees) == (1, 1, False)
+    with pytest.raises(BadFile, match="must be 0, 1 or 2"):
+        changed(at + 2, "3")
+
+
 def test_a_box_that_is_off_is_measured(written: Callable[..., ExportPlan]) -> None:
     plan = written("coco")
     path = plan.out / "annotations" / "instances_train.json"
@@ -135,5 +155,5 @@ def test_poses_are_compared_where_they_are_seen() -> None:
 
 
 def test_nothing_read_is_nothing_that_agrees() -> None:
-    empty = Comparison("x", 0, 0, 3, 0, 0, 0, 0, 0.0, 0.5, "", ())
+    empty = Comparison("x", 0, 0, 3, 0, 0, 0, 0, 0, 0.0, 0.5, "", ())
     assert not empty.agrees
