@@ -1,6 +1,6 @@
 """The dataset formats by name. Adding one is one file and one line here."""
 
-from ars_web.datasets.writers import ars, coco, cvat, cvat_video, voc, yolo
+from ars_web.datasets.writers import ars, coco, cvat, cvat_video, parquet, voc, yolo
 from ars_web.datasets.writers.writer import Writer
 from ars_web.errors import BadInput
 
@@ -14,6 +14,7 @@ WRITERS: dict[str, Writer] = {
         cvat.WRITER,
         cvat.POLYGONS,
         cvat_video.WRITER,
+        parquet.WRITER,
     )
 }
 """In the order in which they are offered."""
