@@ -45,8 +45,8 @@ def plan_export(
     `frames_per_shard` overrides the planner's choice of shards; the dataset's bytes do not depend on it.
 
     Raises:
-        BadInput: the format or the shape is unknown or cannot be made, `out` is in use, a frame or a session is
-            chosen that is not there, or no frame at all, or the format can hold nothing of the sessions.
+        BadInput: the format or the shape is unknown or cannot be made, the format can hold nothing useful of the
+            sessions, `out` is in use, a frame or a session is chosen that is not there, or no frame at all.
         BadFile: a source image is missing, or has become a link.
     """
     writer = writer_of(format)
@@ -87,7 +87,7 @@ def plan_export(
     most_boxes = max(len(session.boxes) for session in sessions)
     length = frames_per_shard or _frames_per_shard(len(frames), most_boxes, options.images)
     plan = ExportPlan(out, format, options, classes, sessions, frames, _shards(counts, length))
-    # What the format cannot hold at all is refused now, not after the work.
+    # A format that can hold nothing useful of it, or not be written here, says so now and not when all is done.
     writer.losses(plan)
     return plan
 

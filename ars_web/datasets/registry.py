@@ -1,6 +1,6 @@
 """The dataset formats by name. Adding one is one file and one line here."""
 
-from ars_web.datasets.writers import ars, coco, voc, yolo, yolo_obb, yolo_pose, yolo_seg
+from ars_web.datasets.writers import ars, coco, cvat, cvat_video, parquet, voc, yolo, yolo_obb, yolo_pose, yolo_seg
 from ars_web.datasets.writers.writer import Writer
 from ars_web.errors import BadInput
 
@@ -13,6 +13,10 @@ WRITERS: dict[str, Writer] = {
         yolo_pose.WRITER,
         coco.WRITER,
         voc.WRITER,
+        cvat.WRITER,
+        cvat.POLYGONS,
+        cvat_video.WRITER,
+        parquet.WRITER,
         ars.WRITER,
     )
 }

@@ -108,8 +108,8 @@ class Writer:
         format: its key in the registry and on the command line.
         title: its name for people.
         description: what it is for, and what it holds, in one line.
-        label_folder: every file below it is a label file, and `dataset.json`'s sha256 is over those; `` where all
-            of the dataset is.
+        label_folder: every file below it is a label file, and `dataset.json`'s sha256 is over those; or the one
+            label file.
         image_folder: from a split to the folder of its images; None: their bytes are in the files that it writes.
         write: writes a shard's label files below the folder `files`, which becomes part of the dataset, and what
             is to be joined below `fragments`; returns the digests of the label files in `files`.
