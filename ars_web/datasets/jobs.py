@@ -15,16 +15,19 @@ from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import (
     FIRST_COMPLETED,
     BrokenExecutor,
+    CancelledError,
     Executor,
     Future,
     ProcessPoolExecutor,
     ThreadPoolExecutor,
     wait,
 )
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
 
+from ars_web.datasets import cluster as clusters
 from ars_web.datasets.assembly import assemble, finished_shards, is_published, publish
 from ars_web.datasets.plan import ExportPlan, plan_export, usable_out
 from ars_web.datasets.plan_files import digest_of, read_digest, write_plan
@@ -43,10 +46,28 @@ it begins to pay."""
 MOST_DEATHS = 3
 """A shard that kills its worker this often is given up."""
 
+SHOWN_IMAGES = 2
+"""Of so many images, spread over the export, every worker of a cluster is asked whether it sees them."""
+
 _BOOT = "boot"
 
 _LOOK_EVERY = 0.1
 """Seconds between looks whether the caller wants to stop."""
+
+
+@dataclass(frozen=True)
+class Workplace:
+    """Where shards are run.
+
+    Attributes:
+        executor: makes an executor.
+        killed: what a future raises whose worker was killed.
+        cancelled: whether the caller wants to stop; raises OSError where the place is gone.
+    """
+
+    executor: Callable[[], Executor]
+    killed: tuple[type[Exception], ...]
+    cancelled: Callable[[], bool]
 
 
 def partial_folder(out: Path) -> Path:
@@ -59,32 +80,39 @@ def run_export(
     *,
     executor_factory: Callable[[], Executor] | None = None,
     workers: int | None = None,
+    cluster: clusters.Cluster | None = None,
     on_progress: Callable[[int, int], None] | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> ExportReport:
     """Do a planned export; where a partial folder of the same plan is found, only what is missing in it.
 
-    `executor_factory` makes an executor each time one is needed (None: a thread for a small export, else a pool of
-    `workers` processes). `on_progress(done, total)` counts frames. `cancelled` is asked some ten times a second;
-    when it answers yes the workers stop, everything written is removed, and Cancelled is raised. An exception out
-    of either callback, Ctrl-C included, stops the workers too, but what is written stays and can be resumed.
+    `executor_factory` makes an executor each time one is needed (None: that of the `cluster`; without one a thread
+    for a small export, else a pool of `workers` processes). `on_progress(done, total)` counts frames. `cancelled` is
+    asked some ten times a second; when it answers yes the workers stop, everything written is removed, and Cancelled
+    is raised. An exception out of either callback, Ctrl-C included, stops the workers too, but what is written stays
+    and can be resumed.
 
     Raises:
         BadFile: a source image is missing, damaged or changed; nothing is published and nothing stays.
-        BadInput: another export writes to the same folder.
+        BadInput: another export writes to the same folder, or the cluster cannot be reached or cannot do the work.
         Cancelled: as asked.
-        StoreError: the disk is full or not to be written; what is written stays and can be resumed.
+        StoreError: the disk is full or not to be written, or the cluster is gone; what is written stays and can be
+            resumed.
         ArsError: a shard killed its worker MOST_DEATHS times; the message names it.
     """
     usable_out(plan.out)
     partial = partial_folder(plan.out)
-    make = executor_factory or (lambda: _default_executor(plan, workers))
+    place = Workplace(
+        executor_factory or (lambda: _default_executor(plan, workers)), (BrokenExecutor,), cancelled or _never
+    )
     try:
         partial.mkdir(parents=True, exist_ok=True)
-        with _locked(partial):
+        with _locked(partial), ExitStack() as stack:
+            _prepare(plan, partial)
+            if cluster is not None and executor_factory is None:
+                place = _on_cluster(plan, partial, cluster, place, stack)
             try:
-                _prepare(plan, partial)
-                _run_shards(plan, partial, make, on_progress or _no_progress, cancelled or _never)
+                _run_shards(plan, partial, place, on_progress or _no_progress)
                 report = assemble(plan, partial)
                 if cancelled and cancelled():
                     raise Cancelled("the export was cancelled")
@@ -159,17 +187,30 @@ def _default_executor(plan: ExportPlan, workers: int | None) -> Executor:
     )
 
 
-def _run_shards(
-    plan: ExportPlan,
-    partial: Path,
-    make: Callable[[], Executor],
-    on_progress: Callable[[int, int], None],
-    cancelled: Callable[[], bool],
-) -> None:
+def _on_cluster(
+    plan: ExportPlan, partial: Path, cluster: clusters.Cluster, place: Workplace, stack: ExitStack
+) -> Workplace:
+    """The cluster as the place to work at, once its workers were looked at; left when the stack is."""
+    token, content = partial / "token", clusters.new_token()
+    token.write_text(content, encoding="ascii")
+    sources = plan.frames.sources if plan.options.images != "none" else ()
+    step = max(1, -(-len(sources) // SHOWN_IMAGES))
+    try:
+        connection = stack.enter_context(clusters.connected(cluster))
+        connection.check_workers(str(token), content, images=sources[::step])
+    except BadInput:
+        # What an earlier run did is as good as before, and goes on once the cluster is in order.
+        if not finished_shards(plan, partial):
+            shutil.rmtree(partial, ignore_errors=True)
+        raise
+    return Workplace(connection.executor, (connection.killed, *place.killed), connection.watching(place.cancelled))
+
+
+def _run_shards(plan: ExportPlan, partial: Path, place: Workplace, on_progress: Callable[[int, int], None]) -> None:
     """Run every missing shard; a pool that a killed worker broke is replaced, and the rest goes on.
 
-    A broken pool does not say who broke it. The shards that were begun are suspects and are run one at a time
-    from then on, so that the second death tells.
+    A broken pool does not say who broke it, and a cluster also blames shards that only waited for the worker. The
+    shards that were begun are suspects and are run one at a time from then on, so that the second death tells.
     """
     deaths: Counter[int] = Counter()
     idle_deaths = 0
@@ -180,15 +221,16 @@ def _run_shards(
         (partial / CANCEL).unlink(missing_ok=True)
         batch = [number for number in missing if not deaths[number]] or missing[:1]
         try:
-            _run_batch(plan, partial, batch, make, on_progress, cancelled)
-        except BrokenExecutor as error:
-            begun = [number for number in batch if begun_folders(partial, number)]
+            _run_batch(plan, partial, batch, place, on_progress)
+        except place.killed as error:
+            # Each try has a folder of its own. A cluster tries several times before it gives up.
+            tries = {number: len(begun_folders(partial, number)) for number in batch}
+            begun = [number for number in batch if tries[number]]
             _log.warning("a worker was killed; shards %s are run again", begun or batch)
-            deaths.update(begun)
+            deaths.update(tries)
             idle_deaths = 0 if begun else idle_deaths + 1
-            for number in begun:
-                if deaths[number] >= MOST_DEATHS:
-                    raise ArsError(_given_up(plan, number)) from error
+            if len(begun) == 1 and deaths[begun[0]] >= MOST_DEATHS:
+                raise ArsError(_given_up(plan, begun[0])) from error
             if idle_deaths >= MOST_DEATHS:
                 raise ArsError(
                     f"workers were killed {MOST_DEATHS} times before they began a shard; is memory short, or does the"
@@ -209,29 +251,39 @@ def _run_batch(
     plan: ExportPlan,
     partial: Path,
     numbers: Sequence[int],
-    make: Callable[[], Executor],
+    place: Workplace,
     on_progress: Callable[[int, int], None],
-    cancelled: Callable[[], bool],
 ) -> None:
-    """Run these shards in one executor. Whatever ends this early, no worker is left writing."""
+    """Run these shards in one executor. Whatever ends this early, no worker is left writing.
+
+    A killed worker is told of at the end: where the executor goes on without it, the other shards get done.
+    """
     total = len(plan.frames)
     done = sum(plan.shards[n][1] - plan.shards[n][0] for n in finished_shards(plan, partial))
     digest = digest_of(plan)
-    with make() as executor:
+    death: Exception | None = None
+    with place.executor() as executor:
         try:
             on_progress(done, total)
             running: set[Future[int]] = {executor.submit(export_shard, str(partial), n, digest) for n in numbers}
             while running:
-                if cancelled():
+                if place.cancelled():
                     raise Cancelled("the export was cancelled")
                 ended, running = wait(running, timeout=_LOOK_EVERY, return_when=FIRST_COMPLETED)
                 for future in ended:
-                    done += future.result()
+                    try:
+                        done += future.result()
+                    except place.killed as error:
+                        death = error
+                    except CancelledError as error:
+                        raise ConnectionError("the executor was shut down by someone else, or is gone") from error
                     on_progress(done, total)
         except BaseException:
             _ask_to_stop(partial)
             executor.shutdown(wait=True, cancel_futures=True)
             raise
+    if death is not None:
+        raise death
 
 
 def _ask_to_stop(partial: Path) -> None:
