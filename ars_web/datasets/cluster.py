@@ -90,7 +90,9 @@ def checked_executor(executor: str) -> str:
     if executor == "local":
         return executor
     if not _ADDRESS.fullmatch(executor):
-        raise BadInput(f"the executor must be local or a Dask scheduler at tls://HOST:PORT, not {executor!r}")
+        raise BadInput(
+            f"{executor!r} is no place to run exports at: give local, or a Dask scheduler as tls://HOST:PORT"
+        )
     parts = urlsplit(executor)
     if parts.scheme == "tcp" and not _is_loopback(parts.hostname or ""):
         raise BadInput(
