@@ -1,8 +1,7 @@
 """Running a planned export: shards through an executor, resumed from what is missing, published whole or not at all.
 
-Only the standard `concurrent.futures.Executor` interface is used, so any executor whose workers see the partial
-folder will do. The partial folder `.NAME.partial` lies beside the dataset's, in the same file system; a lock on it
-keeps two exports from sharing it.
+Any executor whose workers see the partial folder will do. That folder, `.NAME.partial`, lies beside the dataset's, in
+the same file system; a lock on it keeps two exports from sharing it.
 """
 
 import errno
@@ -10,20 +9,9 @@ import fcntl
 import logging
 import os
 import shutil
-from collections import Counter
 from collections.abc import Callable, Generator, Sequence
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    BrokenExecutor,
-    CancelledError,
-    Executor,
-    Future,
-    ProcessPoolExecutor,
-    ThreadPoolExecutor,
-    wait,
-)
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -32,6 +20,7 @@ from ars_web.datasets.assembly import assemble, finished_shards, is_published, p
 from ars_web.datasets.plan import ExportPlan, plan_export, usable_out
 from ars_web.datasets.plan_files import digest_of, read_digest, write_plan
 from ars_web.datasets.report import ExportReport
+from ars_web.datasets.shard_runs import Workplace, run_shards
 from ars_web.datasets.worker import CANCEL, begun_folders, export_shard, start_worker
 from ars_web.errors import ArsError, BadInput, Cancelled, StoreError
 
@@ -43,31 +32,10 @@ POOL_FROM_SECONDS = 3.0
 """Exports of less work than this run in a thread: a pool of two processes takes a second to start, so that is where
 it begins to pay."""
 
-MOST_DEATHS = 3
-"""A shard that kills its worker this often is given up."""
-
 SHOWN_IMAGES = 2
 """Of so many images, spread over the export, every worker of a cluster is asked whether it sees them."""
 
 _BOOT = "boot"
-
-_LOOK_EVERY = 0.1
-"""Seconds between looks whether the caller wants to stop."""
-
-
-@dataclass(frozen=True)
-class Workplace:
-    """Where shards are run.
-
-    Attributes:
-        executor: makes an executor.
-        killed: what a future raises whose worker was killed.
-        cancelled: whether the caller wants to stop; raises OSError where the place is gone.
-    """
-
-    executor: Callable[[], Executor]
-    killed: tuple[type[Exception], ...]
-    cancelled: Callable[[], bool]
 
 
 def partial_folder(out: Path) -> Path:
@@ -98,7 +66,7 @@ def run_export(
         Cancelled: as asked.
         StoreError: the disk is full or not to be written, or the cluster is gone; what is written stays and can be
             resumed.
-        ArsError: a shard killed its worker MOST_DEATHS times; the message names it.
+        ArsError: a shard kills its worker whenever it is run; the message names it.
     """
     usable_out(plan.out)
     partial = partial_folder(plan.out)
@@ -112,7 +80,7 @@ def run_export(
             if cluster is not None and executor_factory is None:
                 place = _on_cluster(plan, partial, cluster, place, stack)
             try:
-                _run_shards(plan, partial, place, on_progress or _no_progress)
+                run_shards(plan, _FolderKeeper(plan, partial), place, on_progress or _no_progress)
                 report = assemble(plan, partial)
                 if cancelled and cancelled():
                     raise Cancelled("the export was cancelled")
@@ -206,84 +174,32 @@ def _on_cluster(
     return Workplace(connection.executor, (connection.killed, *place.killed), connection.watching(place.cancelled))
 
 
-def _run_shards(plan: ExportPlan, partial: Path, place: Workplace, on_progress: Callable[[int, int], None]) -> None:
-    """Run every missing shard; a pool that a killed worker broke is replaced, and the rest goes on.
+class _FolderKeeper:
+    """Shards in a partial folder on a disk that the workers share."""
 
-    A broken pool does not say who broke it, and a cluster also blames shards that only waited for the worker. The
-    shards that were begun are suspects and are run one at a time from then on, so that the second death tells.
-    """
-    deaths: Counter[int] = Counter()
-    idle_deaths = 0
-    while missing := sorted(set(range(len(plan.shards))) - set(finished_shards(plan, partial))):
-        for number in missing:
-            for folder in begun_folders(partial, number):
+    def __init__(self, plan: ExportPlan, partial: Path) -> None:
+        self._plan = plan
+        self._partial = partial
+        self._digest = digest_of(plan)
+
+    def finished(self) -> list[int]:
+        return finished_shards(self._plan, self._partial)
+
+    def tries(self, number: int) -> int:
+        # Each try has a folder of its own.
+        return len(begun_folders(self._partial, number))
+
+    def begin_round(self, numbers: Sequence[int]) -> None:
+        for number in numbers:
+            for folder in begun_folders(self._partial, number):
                 shutil.rmtree(folder, ignore_errors=True)
-        (partial / CANCEL).unlink(missing_ok=True)
-        batch = [number for number in missing if not deaths[number]] or missing[:1]
-        try:
-            _run_batch(plan, partial, batch, place, on_progress)
-        except place.killed as error:
-            # Each try has a folder of its own. A cluster tries several times before it gives up.
-            tries = {number: len(begun_folders(partial, number)) for number in batch}
-            begun = [number for number in batch if tries[number]]
-            _log.warning("a worker was killed; shards %s are run again", begun or batch)
-            deaths.update(tries)
-            idle_deaths = 0 if begun else idle_deaths + 1
-            if len(begun) == 1 and deaths[begun[0]] >= MOST_DEATHS:
-                raise ArsError(_given_up(plan, begun[0])) from error
-            if idle_deaths >= MOST_DEATHS:
-                raise ArsError(
-                    f"workers were killed {MOST_DEATHS} times before they began a shard; is memory short, or does the"
-                    " script that exports lack its `if __name__ == '__main__':`?"
-                ) from error
+        (self._partial / CANCEL).unlink(missing_ok=True)
 
+    def submit(self, executor: Executor, number: int) -> Future[int]:
+        return executor.submit(export_shard, str(self._partial), number, self._digest)
 
-def _given_up(plan: ExportPlan, number: int) -> str:
-    start, stop = plan.shards[number]
-    session = plan.sessions[int(plan.frames.session[start])]
-    return (
-        f"shard {number:05d} killed its worker {MOST_DEATHS} times: frames {plan.frames.index[start]} to"
-        f" {plan.frames.index[stop - 1]} of session {session.id}; is memory short, or one of their images at fault?"
-    )
-
-
-def _run_batch(
-    plan: ExportPlan,
-    partial: Path,
-    numbers: Sequence[int],
-    place: Workplace,
-    on_progress: Callable[[int, int], None],
-) -> None:
-    """Run these shards in one executor. Whatever ends this early, no worker is left writing.
-
-    A killed worker is told of at the end: where the executor goes on without it, the other shards get done.
-    """
-    total = len(plan.frames)
-    done = sum(plan.shards[n][1] - plan.shards[n][0] for n in finished_shards(plan, partial))
-    digest = digest_of(plan)
-    death: Exception | None = None
-    with place.executor() as executor:
-        try:
-            on_progress(done, total)
-            running: set[Future[int]] = {executor.submit(export_shard, str(partial), n, digest) for n in numbers}
-            while running:
-                if place.cancelled():
-                    raise Cancelled("the export was cancelled")
-                ended, running = wait(running, timeout=_LOOK_EVERY, return_when=FIRST_COMPLETED)
-                for future in ended:
-                    try:
-                        done += future.result()
-                    except place.killed as error:
-                        death = error
-                    except CancelledError as error:
-                        raise ConnectionError("the executor was shut down by someone else, or is gone") from error
-                    on_progress(done, total)
-        except BaseException:
-            _ask_to_stop(partial)
-            executor.shutdown(wait=True, cancel_futures=True)
-            raise
-    if death is not None:
-        raise death
+    def ask_to_stop(self) -> None:
+        _ask_to_stop(self._partial)
 
 
 def _ask_to_stop(partial: Path) -> None:
