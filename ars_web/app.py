@@ -2,13 +2,11 @@
 
 import errno
 import gc
-import importlib
 import ipaddress
 import logging
 import socket
 import sys
 from collections.abc import AsyncGenerator, Callable, Mapping
-from concurrent.futures import Executor
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
 from importlib.resources import files
 from pathlib import Path
@@ -61,6 +59,7 @@ from ars_web.api.presence import Presence
 from ars_web.api.security import Door, Guard
 from ars_web.api.telling import TellingViews
 from ars_web.api.websocket_wire import WebsocketWire
+from ars_web.datasets.cluster import cluster_at
 from ars_web.datasets.exports import ExportJobs
 from ars_web.errors import BadInput, StoreError
 from ars_web.masks.boxing import ObjectBoxes
@@ -151,12 +150,12 @@ def create_app(settings: Settings) -> FastAPI:
 def _lifespan(settings: Settings, segmenter: Segmenter) -> Callable[[FastAPI], AbstractAsyncContextManager[None]]:
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncGenerator[None]:
-        make_executor = executor_factory(settings.executor)
+        cluster = cluster_at(
+            settings.executor, ca_file=settings.tls_ca_file, cert=settings.tls_cert, key=settings.tls_key
+        )
         token = sessions_token(settings)
         with SessionStore(settings.sessions) as store:
-            jobs = ExportJobs(
-                settings.sessions, store.snapshot, executor_factory=make_executor, workers=settings.workers
-            )
+            jobs = ExportJobs(settings.sessions, store.snapshot, workers=settings.workers, cluster=cluster)
             uploads = Uploads(settings.sessions)
             import_jobs = ImportJobs(store, uploads)
             editor = SessionEditor(store)
@@ -225,22 +224,6 @@ def sessions_token(settings: Settings) -> str:
     except OSError as error:
         raise StoreError(f"{settings.sessions}: the sessions folder cannot be made: {error.strerror}") from error
     return settings.token or install_token(settings.sessions)
-
-
-def executor_factory(executor: str) -> Callable[[], Executor] | None:
-    """What makes the executors of exports; None: local processes.
-
-    Raises:
-        BadInput: Dask is asked for and not installed.
-    """
-    if executor == "local":
-        return None
-    try:
-        # Its name is not imported above: Dask is wanted only where a cluster is.
-        distributed = importlib.import_module("distributed")
-    except ImportError as error:
-        raise BadInput(f"the executor {executor} needs Dask: install the package `distributed`") from error
-    return lambda: distributed.Client(executor).get_executor()
 
 
 def static_folder() -> Path:

@@ -24,6 +24,24 @@ UNTELLING_STEMS = ("transforms", "poses", "groundtruth", "images", "cameras")
 SPELLED_DIFFERENTLY = {"sessions": "--merge", "roots": "--root", "hosts": "--allow-host"}
 """Options whose name is not that of their setting with dashes."""
 
+
+def _safe_executor(executor: str) -> str:
+    """Where exports run.
+
+    Raises:
+        typer.BadParameter: it may not be used.
+    """
+    if executor == "local":
+        return executor
+
+    from ars_web.datasets import cluster
+
+    try:
+        return cluster.checked_executor(executor)
+    except BadInput as error:
+        raise typer.BadParameter(str(error), param_hint="--executor") from error
+
+
 Sessions = Annotated[
     Path, typer.Option("--sessions", metavar="DIR", envvar="ARS_WEB_SESSIONS", help="The sessions folder.")
 ]
@@ -50,8 +68,22 @@ Token = Annotated[
     typer.Option("--token", metavar="TOKEN", envvar="ARS_WEB_TOKEN", help="Bearer token; default: the folder's own."),
 ]
 Executor = Annotated[
-    str, typer.Option("--executor", metavar="local|tls://HOST:PORT", help="Where exports run: here, or on Dask.")
+    str,
+    typer.Option(
+        "--executor",
+        metavar="local|tls://HOST:PORT",
+        help="Where exports run: here, or on Dask.",
+        callback=_safe_executor,
+    ),
 ]
+TlsCaFile = Annotated[
+    Path | None,
+    typer.Option("--tls-ca-file", metavar="FILE", help="Certificate of who signed the cluster's; default: Dask's own."),
+]
+TlsCert = Annotated[
+    Path | None, typer.Option("--tls-cert", metavar="FILE", help="Certificate to show to the cluster's scheduler.")
+]
+TlsKey = Annotated[Path | None, typer.Option("--tls-key", metavar="FILE", help="That certificate's key.")]
 Segmenter = Annotated[
     Path | None,
     typer.Option(

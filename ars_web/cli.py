@@ -111,6 +111,9 @@ def serve(
     root: take.Roots = None,
     token: take.Token = None,
     executor: take.Executor = "local",
+    tls_ca_file: take.TlsCaFile = None,
+    tls_cert: take.TlsCert = None,
+    tls_key: take.TlsKey = None,
     workers: take.Workers = None,
     segmenter: take.Segmenter = None,
     allow_host: take.AllowedHosts = None,
@@ -126,6 +129,9 @@ def serve(
         "roots": take.named_roots(root),
         "token": token,
         "executor": executor,
+        "tls_ca_file": tls_ca_file,
+        "tls_cert": tls_cert,
+        "tls_key": tls_key,
         "workers": workers,
         "segmenter": segmenter,
         "hosts": allow_host or [],
@@ -203,12 +209,17 @@ def export(
     split_by: take.SplitBy = None,
     split_seed: take.SplitSeed = None,
     merge: take.Merge = None,
+    executor: take.Executor = "local",
+    tls_ca_file: take.TlsCaFile = None,
+    tls_cert: take.TlsCert = None,
+    tls_key: take.TlsKey = None,
     workers: take.Workers = None,
     check: take.Check = False,
     sessions: take.Sessions = take.SESSIONS,
     as_json: take.Json = False,
 ) -> None:
     """Write a training set. Ctrl-C stops it; the same command then goes on from there."""
+    from ars_web.datasets.cluster import cluster_at
     from ars_web.datasets.jobs import plan_export, run_export
     from ars_web.datasets.readback.comparison import compare
     from ars_web.datasets.registry import WRITERS
@@ -216,6 +227,7 @@ def export(
 
     if kind not in WRITERS:
         raise typer.BadParameter(f"{kind!r} is none of {', '.join(WRITERS)}", param_hint="--format")
+    cluster = cluster_at(executor, ca_file=tls_ca_file, cert=tls_cert, key=tls_key)
     with SessionStore(sessions) as store:
         ids = [store.find(name) for name in (session, *take.comma_separated(merge, "--merge"))]
         given = {
@@ -240,7 +252,7 @@ def export(
     plan = plan_export(snapshots, format=kind, options=options, out=out)
     try:
         with progress("Exporting") as advance:
-            report = run_export(plan, workers=workers, on_progress=advance)
+            report = run_export(plan, workers=workers, cluster=cluster, on_progress=advance)
     except KeyboardInterrupt:
         note("ars-web: stopped; the same command goes on from here")
         raise typer.Exit(INTERRUPTED) from None

@@ -105,6 +105,7 @@ def _beside(name: str) -> ModuleType:
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # where dataclasses look for their annotations
     spec.loader.exec_module(module)
     return module
 
@@ -131,6 +132,12 @@ def painted_ring() -> ModuleType:
 def tiny_network() -> ModuleType:
     """`tiny_network.py`: writes small ONNX files."""
     return _beside("tiny_network")
+
+
+@pytest.fixture(scope="session")
+def dask_cluster() -> ModuleType:
+    """`dask_cluster.py`: a Dask cluster with TLS on loopback."""
+    return _beside("dask_cluster")
 
 
 def pytest_report_header() -> str:

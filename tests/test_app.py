@@ -1,5 +1,6 @@
 """The server as a process: how it starts, what it prints, how it ends."""
 
+import asyncio
 import signal
 import socket
 import stat
@@ -10,7 +11,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from ars_web.app import create_app, executor_factory, listening, serve, sessions_token, static_folder
+from ars_web.app import create_app, listening, serve, sessions_token, static_folder
 from ars_web.errors import BadInput, StoreError
 from ars_web.settings import Settings
 
@@ -95,11 +96,16 @@ def test_only_a_dask_scheduler_with_tls_is_taken(executor: str) -> None:
         Settings(sessions=Path(), executor=executor)
 
 
-def test_a_dask_scheduler_without_dask_is_said_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert executor_factory("local") is None
+def test_a_server_without_dask_does_not_start_for_a_scheduler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
+    app = create_app(Settings(sessions=tmp_path, executor="tls://host:8786"))
+
+    async def start() -> None:
+        async with app.router.lifespan_context(app):
+            pass
+
     with pytest.raises(BadInput, match="distributed"):
-        executor_factory("tls://host:8786")
+        asyncio.run(start())
 
 
 def test_a_root_that_is_no_folder_is_refused(tmp_path: Path) -> None:

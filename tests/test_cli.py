@@ -246,7 +246,8 @@ def test_json_is_all_there_is_on_stdout(
         (("serve", "--root", "here"), "NAME=PATH"),
         (("serve", "--root", "a=.", "--root", "a=."), "'a'"),
         (("serve", "--root", "a=nowhere"), "nowhere"),
-        (("serve", "--executor", "tcp://127.0.0.1:1"), "--executor"),
+        (("serve", "--executor", "tcp://192.0.2.7:1"), "a plain port runs the code of anyone"),
+        (("export", "SESSION", "--format", "yolo", "--out", "D", "--executor", "tcp://192.0.2.7:1"), "--executor"),
         (("serve", "--port", "70000"), "--port"),
     ],
 )

@@ -21,6 +21,7 @@ from typing import Any, Literal
 from pydantic import TypeAdapter, ValidationError
 
 from ars_web.datasets.assembly import DOCUMENT
+from ars_web.datasets.cluster import Cluster
 from ars_web.datasets.forecast import Forecast, forecast
 from ars_web.datasets.jobs import partial_folder, run_export
 from ars_web.datasets.options import ExportOptions
@@ -91,12 +92,14 @@ class ExportJobs:
         *,
         executor_factory: Callable[[], Executor] | None = None,
         workers: int | None = None,
+        cluster: Cluster | None = None,
     ) -> None:
         """`folder` is the sessions folder; `snapshot_of` raises NotFound for an unknown session id."""
         self._folder = folder / ".exports"
         self._snapshot_of = snapshot_of
         self._executor_factory = executor_factory
         self._workers = workers
+        self._cluster = cluster
         self._lock = threading.Lock()
         self._closing = threading.Event()
         self._runner = ThreadPoolExecutor(max_workers=1, thread_name_prefix="export")
@@ -279,6 +282,7 @@ class ExportJobs:
                     plan,
                     executor_factory=self._executor_factory,
                     workers=self._workers,
+                    cluster=self._cluster,
                     on_progress=lambda done, total: self._progress(job_id, done, total),
                     cancelled=lambda: self._stopped(job_id),
                 )

@@ -1,8 +1,7 @@
 """Running a planned export: shards through an executor, resumed from what is missing, published whole or not at all.
 
-Only the standard `concurrent.futures.Executor` interface is used, so any executor whose workers see the partial
-folder will do. The partial folder `.NAME.partial` lies beside the dataset's, in the same file system; a lock on it
-keeps two exports from sharing it.
+Any executor whose workers see the partial folder will do. That folder, `.NAME.partial`, lies beside the dataset's, in
+the same file system; a lock on it keeps two exports from sharing it.
 """
 
 import errno
@@ -10,26 +9,19 @@ import fcntl
 import logging
 import os
 import shutil
-from collections import Counter
 from collections.abc import Callable, Generator, Sequence
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    BrokenExecutor,
-    Executor,
-    Future,
-    ProcessPoolExecutor,
-    ThreadPoolExecutor,
-    wait,
-)
-from contextlib import contextmanager
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager
 from multiprocessing import get_context
 from pathlib import Path
 
+from ars_web.datasets import cluster as clusters
 from ars_web.datasets.assembly import assemble, finished_shards, is_published, publish
 from ars_web.datasets.plan import plan_export, usable_out
 from ars_web.datasets.plan_files import digest_of, read_digest, write_plan
 from ars_web.datasets.planned import ExportPlan
 from ars_web.datasets.report import ExportReport
+from ars_web.datasets.shard_runs import Workplace, run_shards
 from ars_web.datasets.worker import CANCEL, begun_folders, export_shard, start_worker
 from ars_web.errors import ArsError, BadInput, Cancelled, StoreError
 
@@ -41,13 +33,10 @@ POOL_FROM_SECONDS = 3.0
 """Exports of less work than this run in a thread: a pool of two processes takes a second to start, so that is where
 it begins to pay."""
 
-MOST_DEATHS = 3
-"""A shard that kills its worker this often is given up."""
+SHOWN_IMAGES = 2
+"""Of so many images, spread over the export, every worker of a cluster is asked whether it sees them."""
 
 _BOOT = "boot"
-
-_LOOK_EVERY = 0.1
-"""Seconds between looks whether the caller wants to stop."""
 
 
 def partial_folder(out: Path) -> Path:
@@ -60,32 +49,39 @@ def run_export(
     *,
     executor_factory: Callable[[], Executor] | None = None,
     workers: int | None = None,
+    cluster: clusters.Cluster | None = None,
     on_progress: Callable[[int, int], None] | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> ExportReport:
     """Do a planned export; where a partial folder of the same plan is found, only what is missing in it.
 
-    `executor_factory` makes an executor each time one is needed (None: a thread for a small export, else a pool of
-    `workers` processes). `on_progress(done, total)` counts frames. `cancelled` is asked some ten times a second;
-    when it answers yes the workers stop, everything written is removed, and Cancelled is raised. An exception out
-    of either callback, Ctrl-C included, stops the workers too, but what is written stays and can be resumed.
+    `executor_factory` makes an executor each time one is needed (None: that of the `cluster`; without one a thread
+    for a small export, else a pool of `workers` processes). `on_progress(done, total)` counts frames. `cancelled` is
+    asked some ten times a second; when it answers yes the workers stop, everything written is removed, and Cancelled
+    is raised. An exception out of either callback, Ctrl-C included, stops the workers too, but what is written stays
+    and can be resumed.
 
     Raises:
         BadFile: a source image is missing, damaged or changed; nothing is published and nothing stays.
-        BadInput: another export writes to the same folder.
+        BadInput: another export writes to the same folder, or the cluster cannot be reached or cannot do the work.
         Cancelled: as asked.
-        StoreError: the disk is full or not to be written; what is written stays and can be resumed.
-        ArsError: a shard killed its worker MOST_DEATHS times; the message names it.
+        StoreError: the disk is full or not to be written, or the cluster is gone; what is written stays and can be
+            resumed.
+        ArsError: a shard kills its worker whenever it is run; the message names it.
     """
     usable_out(plan.out)
     partial = partial_folder(plan.out)
-    make = executor_factory or (lambda: _default_executor(plan, workers))
+    place = Workplace(
+        executor_factory or (lambda: _default_executor(plan, workers)), (BrokenExecutor,), cancelled or _never
+    )
     try:
         partial.mkdir(parents=True, exist_ok=True)
-        with _locked(partial):
+        with _locked(partial), ExitStack() as stack:
+            _prepare(plan, partial)
+            if cluster is not None and executor_factory is None:
+                place = _on_cluster(plan, partial, cluster, place, stack)
             try:
-                _prepare(plan, partial)
-                _run_shards(plan, partial, make, on_progress or _no_progress, cancelled or _never)
+                run_shards(plan, _FolderKeeper(plan, partial), place, on_progress or _no_progress)
                 report = assemble(plan, partial)
                 if cancelled and cancelled():
                     raise Cancelled("the export was cancelled")
@@ -160,79 +156,51 @@ def _default_executor(plan: ExportPlan, workers: int | None) -> Executor:
     )
 
 
-def _run_shards(
-    plan: ExportPlan,
-    partial: Path,
-    make: Callable[[], Executor],
-    on_progress: Callable[[int, int], None],
-    cancelled: Callable[[], bool],
-) -> None:
-    """Run every missing shard; a pool that a killed worker broke is replaced, and the rest goes on.
+def _on_cluster(
+    plan: ExportPlan, partial: Path, cluster: clusters.Cluster, place: Workplace, stack: ExitStack
+) -> Workplace:
+    """The cluster as the place to work at, once its workers were looked at; left when the stack is."""
+    token, content = partial / "token", clusters.new_token()
+    token.write_text(content, encoding="ascii")
+    sources = plan.frames.sources if plan.options.images != "none" else ()
+    step = max(1, -(-len(sources) // SHOWN_IMAGES))
+    try:
+        connection = stack.enter_context(clusters.connected(cluster))
+        connection.check_workers(str(token), content, images=sources[::step])
+    except BadInput:
+        # What an earlier run did is as good as before, and goes on once the cluster is in order.
+        if not finished_shards(plan, partial):
+            shutil.rmtree(partial, ignore_errors=True)
+        raise
+    return Workplace(connection.executor, (connection.killed, *place.killed), connection.watching(place.cancelled))
 
-    A broken pool does not say who broke it. The shards that were begun are suspects and are run one at a time
-    from then on, so that the second death tells.
-    """
-    deaths: Counter[int] = Counter()
-    idle_deaths = 0
-    while missing := sorted(set(range(len(plan.shards))) - set(finished_shards(plan, partial))):
-        for number in missing:
-            for folder in begun_folders(partial, number):
+
+class _FolderKeeper:
+    """Shards in a partial folder on a disk that the workers share."""
+
+    def __init__(self, plan: ExportPlan, partial: Path) -> None:
+        self._plan = plan
+        self._partial = partial
+        self._digest = digest_of(plan)
+
+    def finished(self) -> list[int]:
+        return finished_shards(self._plan, self._partial)
+
+    def tries(self, number: int) -> int:
+        # Each try has a folder of its own.
+        return len(begun_folders(self._partial, number))
+
+    def begin_round(self, numbers: Sequence[int]) -> None:
+        for number in numbers:
+            for folder in begun_folders(self._partial, number):
                 shutil.rmtree(folder, ignore_errors=True)
-        (partial / CANCEL).unlink(missing_ok=True)
-        batch = [number for number in missing if not deaths[number]] or missing[:1]
-        try:
-            _run_batch(plan, partial, batch, make, on_progress, cancelled)
-        except BrokenExecutor as error:
-            begun = [number for number in batch if begun_folders(partial, number)]
-            _log.warning("a worker was killed; shards %s are run again", begun or batch)
-            deaths.update(begun)
-            idle_deaths = 0 if begun else idle_deaths + 1
-            for number in begun:
-                if deaths[number] >= MOST_DEATHS:
-                    raise ArsError(_given_up(plan, number)) from error
-            if idle_deaths >= MOST_DEATHS:
-                raise ArsError(
-                    f"workers were killed {MOST_DEATHS} times before they began a shard; is memory short, or does the"
-                    " script that exports lack its `if __name__ == '__main__':`?"
-                ) from error
+        (self._partial / CANCEL).unlink(missing_ok=True)
 
+    def submit(self, executor: Executor, number: int) -> Future[int]:
+        return executor.submit(export_shard, str(self._partial), number, self._digest)
 
-def _given_up(plan: ExportPlan, number: int) -> str:
-    start, stop = plan.shards[number]
-    session = plan.sessions[int(plan.frames.session[start])]
-    return (
-        f"shard {number:05d} killed its worker {MOST_DEATHS} times: frames {plan.frames.index[start]} to"
-        f" {plan.frames.index[stop - 1]} of session {session.id}; is memory short, or one of their images at fault?"
-    )
-
-
-def _run_batch(
-    plan: ExportPlan,
-    partial: Path,
-    numbers: Sequence[int],
-    make: Callable[[], Executor],
-    on_progress: Callable[[int, int], None],
-    cancelled: Callable[[], bool],
-) -> None:
-    """Run these shards in one executor. Whatever ends this early, no worker is left writing."""
-    total = len(plan.frames)
-    done = sum(plan.shards[n][1] - plan.shards[n][0] for n in finished_shards(plan, partial))
-    digest = digest_of(plan)
-    with make() as executor:
-        try:
-            on_progress(done, total)
-            running: set[Future[int]] = {executor.submit(export_shard, str(partial), n, digest) for n in numbers}
-            while running:
-                if cancelled():
-                    raise Cancelled("the export was cancelled")
-                ended, running = wait(running, timeout=_LOOK_EVERY, return_when=FIRST_COMPLETED)
-                for future in ended:
-                    done += future.result()
-                    on_progress(done, total)
-        except BaseException:
-            _ask_to_stop(partial)
-            executor.shutdown(wait=True, cancel_futures=True)
-            raise
+    def ask_to_stop(self) -> None:
+        _ask_to_stop(self._partial)
 
 
 def _ask_to_stop(partial: Path) -> None:

@@ -11,7 +11,7 @@ whose worker was killed.
 import sys
 from pathlib import Path
 
-from ars_web.datasets import jobs, worker
+from ars_web.datasets import jobs, shard_runs, worker
 from ars_web.datasets.exports import ExportJobs
 from ars_web.datasets.options import ExportOptions
 from ars_web.datasets.plan import plan_export
@@ -32,7 +32,7 @@ if "--in-place" in sys.argv:
 if "--no-watch" in sys.argv:
     worker._exit_after = lambda sentinel: None
 if "--once" in sys.argv:
-    jobs.MOST_DEATHS = 1
+    shard_runs.MOST_DEATHS = 1
 
 
 def export(sessions: str, sid: str, out: str, kind: str) -> None:
