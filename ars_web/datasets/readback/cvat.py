@@ -101,6 +101,6 @@ def _rounding(longer: int) -> float:
 
 READER = Reader(format="cvat", library=own_reading, read=_read_images, rounding=_rounding)
 POLYGONS = Reader(
-    format="cvat-polygons", library=own_reading, read=_read_images, rounding=_rounding, ring_function="silhouette"
+    format="cvat-polygons", library=own_reading, read=_read_images, rounding=_rounding, ring_function="outline"
 )
 TRACKS = Reader(format="cvat-video", library=own_reading, read=_read_tracks, rounding=_rounding)

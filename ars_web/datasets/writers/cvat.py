@@ -242,7 +242,7 @@ POLYGONS = _writer(
     "cvat-polygons",
     "CVAT polygons",
     "For looking at outlines and mending them in CVAT: polygons, with the object's id and how much of it is seen.",
-    shows="silhouette",
+    shows="outline",
     write=partial(_write, polygons=True),
     shape="polygon",
 )
