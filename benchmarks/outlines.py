@@ -63,7 +63,9 @@ def by_opencv(camera: Camera, Ts_world_camera: np.ndarray, meshes: list[Mesh], w
                 found.append(np.zeros((0, 2)))
                 continue
             pixels, _ = cv2.projectPoints(mesh.vertices_world, turn, T_camera_world[:3, 3], camera.K, distortion)
-            ring = cv2.convexHull((pixels[:, 0] + 0.5).astype(np.float32))[:, 0]
+            # What is behind the camera may be anywhere.
+            pixels = np.clip(pixels[:, 0] + 0.5, -1e6, 1e6)
+            ring = cv2.convexHull(pixels.astype(np.float32))[:, 0]
             inside = (ring >= 0).all() and (ring <= [camera.width, camera.height]).all()
             if not inside and len(ring) >= 3:
                 part = shapely.Polygon(ring).intersection(image)
