@@ -9,13 +9,17 @@ from ars_web.geometry import convex_kernels, lens_kernels
 from ars_web.geometry.box import Box, stack
 from ars_web.geometry.camera import Camera
 from ars_web.geometry.frame_blocks import over_blocks
-from ars_web.geometry.labels import NEAR, rings_in_frames
+from ars_web.geometry.labels import FINEST_TOLERANCE, NEAR, rings_in_frames
 from ars_web.geometry.lens import LensTables, lens_tables
 from ars_web.geometry.mesh import Mesh
 from ars_web.geometry.mesh_labels import BLOCK, RIM, check_tolerance, curves_of_mesh
 
 Hulls = tuple[Float[np.ndarray, "_ 2"], Int[np.ndarray, "_"]]
 """The points of rings one after the other, and how many each has."""
+
+FINER = 8
+"""Of the tolerance, for contours: few of their edges need more chords for it, and where the image's border cuts one
+aslant, it is cut as much nearer to where it should be."""
 
 
 def convex_outlines(
@@ -30,8 +34,7 @@ def convex_outlines(
     wanted; row by row, image coordinates.
 
     Rings run counter-clockwise as seen in the image (y down) from their leftmost corner, not closed. They are exact to
-    `tolerance` pixels, along the image's border as far as it cuts the mesh squarely: what is cut aslant is cut as far
-    from where it should be as for `labels.outline`.
+    `tolerance` pixels; what the image's border cuts aslant to more of them, along the border.
 
     Returns:
         All rings' points (k, 2), and `offsets` (n * b + 1,): the ring of mesh j in frame i is
@@ -52,7 +55,7 @@ def convex_outlines(
             points, lengths, settled = _of_whole_meshes(tables, Ts, mesh, asked, tolerance)
             columns.append((points, lengths))
             if (asked & ~settled).any():
-                curves = curves_of_mesh(tables, Ts, mesh, asked & ~settled, tolerance)
+                curves = curves_of_mesh(tables, Ts, mesh, asked & ~settled, max(tolerance / FINER, FINEST_TOLERANCE))
                 others = convex_kernels.hulls_of_curves(tables.lens.width, tables.lens.height, *curves)
                 columns[-1] = _either(columns[-1], others)
         return _row_by_row(columns, len(Ts))
@@ -68,7 +71,7 @@ def convex_outlines_of_boxes(
     *,
     tolerance: float = 0.1,
 ) -> tuple[Float[np.ndarray, "k 2"], Int[np.ndarray, "n*b+1"]]:
-    """The same for boxes, whose rings a lens may bend inwards.
+    """The same for boxes, whose rings a lens may bend inwards; at the image's border they are as `labels.outlines`.
 
     Raises:
         BadInput: `tolerance` is below FINEST_TOLERANCE.

@@ -5,7 +5,6 @@ from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Int
-from manifold3d import Manifold
 
 from ars_web.errors import BadInput
 
@@ -78,13 +77,14 @@ class Mesh:
     @cached_property
     def hull_vertices_world(self) -> Float[np.ndarray, "h 3"]:
         """Those vertices that span the convex hull; all that faces have where a mesh is flat."""
+        # SciPy takes half a second to load. manifold3d is there already, but its hulls leave out corners now and then.
+        from scipy.spatial import ConvexHull, QhullError
+
         used = self.vertices_world[np.unique(self.faces)]
-        centre, radius = self.sphere
-        # Of the size 1 about the origin: what manifold3d takes for flat depends on both.
-        hull = Manifold.hull_points((used - centre) / radius).to_mesh64() if radius > 0.0 else None
-        if hull is None or len(hull.vert_properties) == 0:
+        try:
+            return np.ascontiguousarray(used[ConvexHull(used).vertices])
+        except QhullError:
             return used
-        return np.ascontiguousarray(hull.vert_properties[:, :3] * radius + centre)
 
 
 def edges_of_faces(faces: Int[np.ndarray, "f 3"]) -> Int[np.ndarray, "e 4"]:
