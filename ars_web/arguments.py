@@ -136,6 +136,10 @@ SplitBy = Annotated[
     typer.Option("--split-by", help="Divide runs of frames (default), single frames, or whole sessions."),
 ]
 SplitSeed = Annotated[int | None, typer.Option("--split-seed", metavar="N", help="Default 0.")]
+Check = Annotated[
+    bool,
+    typer.Option("--check", help="Read the set back, and compare each label with the session's; 1 if any differs."),
+]
 # The option is called `sessions` elsewhere; here that name is the sessions folder's.
 Merge = Annotated[
     str | None, typer.Option("--merge", metavar="SESSION,SESSION", help="Further sessions in the same dataset.")

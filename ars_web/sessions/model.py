@@ -12,7 +12,7 @@ from jaxtyping import Float
 from ars_web.errors import BadInput
 from ars_web.geometry.box import FARTHEST, Box
 from ars_web.geometry.camera import Camera
-from ars_web.geometry.keypoints import Keypoint
+from ars_web.geometry.keypoints import DEFAULT_KEYPOINTS, Keypoint
 from ars_web.geometry.polygon import Polygon
 from ars_web.geometry.symmetry import NO_SYMMETRY, Symmetry
 from ars_web.sessions.hull_mesh import HullMesh
@@ -233,6 +233,10 @@ class SessionState:
     def mesh_of(self, box: VirtualBox) -> str | None:
         """The digest of the mesh that a box's object has: the box's own, else its class's; None: neither has one."""
         return box.mesh or self.classes[box.class_id].mesh
+
+    def keypoints_of(self, class_id: int) -> tuple[Keypoint, ...]:
+        """The named points of a class's objects: its own, else the centre and the corners of their boxes."""
+        return self.classes[class_id].keypoints or DEFAULT_KEYPOINTS
 
     @property
     def meshes_named(self) -> frozenset[str]:
