@@ -127,7 +127,10 @@ def test_a_box_is_given_a_mesh_or_a_polygon(command: Command, sessions: Path, tm
         ("{", "ring.json:1: is not JSON"),
         ("3", "ring.json: "),
         ('{"polygon": [[0, 0, 0], [1, 0, 0], [1, 1, "0"]], "frame_of": "box"}', "ring.json: polygon[2][2]: "),
-        ('{"polygon": [[0, 0, 0], [1, 0, 0], [2, 0, 0]], "frame_of": "box"}', "ring.json: the polygon's corners lie"),
+        (
+            '{"polygon": [[0, 0, 0], [1, 0, 0], [2, 0, 0]], "frame_of": "box"}',
+            "ring.json: a flat polygon must have an area",
+        ),
     ):
         ring.write_text(content)
         assert words in command("boxes", "polygon", "1", str(ring), status=1)[1]

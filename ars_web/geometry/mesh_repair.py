@@ -50,8 +50,8 @@ def repaired(vertices: Float[np.ndarray, "v 3"], faces: Int[np.ndarray, "f 3"]) 
     starts, ends = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     key = np.minimum(starts, ends) * len(vertices) + np.maximum(starts, ends)
     count = len(np.unique(key[open_edges.ravel()]))
-    # A face and its back together are nothing new.
-    sides = np.concatenate([faces, faces[:, ::-1]])
+    # As `two_sided` has them; where a face and its back were both there, neither comes twice.
+    sides = np.concatenate([faces, faces[:, [0, 2, 1]]])
     return Repaired(vertices, sides[np.sort(_first_of_each(sides))], dropped, 0, count)
 
 

@@ -6,12 +6,15 @@ import numpy as np
 from jaxtyping import Float
 
 from ars_web.geometry.box import Box
+from ars_web.geometry.flat_mesh import FLATNESS, flat_mesh
 from ars_web.geometry.rigid_transform import invert, transform_points
 from ars_web.meshes.mesh_file import read_mesh_file
 from ars_web.meshes.placement import axes_text
-from ars_web.meshes.polygon import polygon_mesh
 from ars_web.sessions.names import LONGEST_NAME
 from ars_web.sessions.object_mesh import MeshSource, ObjectMesh, SourcedMesh
+
+UNEVEN = 0.01
+"""How far a polygon's corners may be off their plane, as a share of its extent: they were found by hand in photos."""
 
 
 def object_from_file(
@@ -30,11 +33,13 @@ def object_from_file(
 def object_from_polygon(corners: Float[np.ndarray, "k 3"], box: Box, *, in_world: bool) -> SourcedMesh:
     """The mesh of a planar polygon, whose (k, 3) corners are in the box's frame, or in the world; metres.
 
+    Corners a little off the plane that fits them best are moved into it.
+
     Raises:
-        BadInput: see `polygon_mesh`; or it is too far from the box.
+        BadInput: see `flat_mesh`; or it is too far from the box.
     """
     points = np.asarray(corners, dtype=np.float64)
-    vertices, faces = polygon_mesh(points)
-    if in_world:
-        vertices = transform_points(invert(box.T_world_box), vertices)
-    return SourcedMesh(ObjectMesh(vertices, faces), MeshSource("polygon", "m", "x,y,z", "file"))
+    extent = float(np.ptp(points, axis=0).max())
+    flat = flat_mesh(points, tolerance=max(FLATNESS, UNEVEN * extent))
+    vertices = transform_points(invert(box.T_world_box), flat.vertices_world) if in_world else flat.vertices_world
+    return SourcedMesh(ObjectMesh(vertices, flat.faces), MeshSource("polygon", "m", "x,y,z", "file"))

@@ -8,9 +8,11 @@ from jaxtyping import Float
 from pydantic import Field, ValidationError
 
 from ars_web.errors import BadFile
-from ars_web.meshes.polygon import MOST_CORNERS
 from ars_web.sessions.boxes_json import Coordinate, Strict
 from ars_web.sessions.strict_json import first_fault, place_text, strict_json
+
+MOST_CORNERS = 10_000
+"""Of a polygon."""
 
 Corner = tuple[Coordinate, Coordinate, Coordinate]
 

@@ -170,7 +170,7 @@ def test_a_box_may_be_a_planar_polygon(server, client: httpx.Client, sid: str, b
     for body, words in (
         ({"polygon": ring}, "frame_of"),
         ({"polygon": ring[:2], "frame_of": "box"}, "polygon"),
-        ({"polygon": [[0, 0, 0], [1, 0, 0], [1, 1, 1], [0, 1, 0]], "frame_of": "box"}, "not flat"),
+        ({"polygon": [[0, 0, 0], [1, 0, 0], [1, 1, 1], [0, 1, 0]], "frame_of": "box"}, "must lie in one plane"),
         ({"polygon": [[0, 0, "0"], [1, 0, 0], [1, 1, 1]], "frame_of": "box"}, "polygon.0.2"),
     ):
         revision = client.get(path).headers["etag"]

@@ -82,7 +82,7 @@ def test_a_surface_that_ends_somewhere_is_seen_from_both_sides():
     Mesh(mesh.vertices, mesh.faces)
     assert volume(mesh.vertices, mesh.faces) == pytest.approx(0.0)
     one = repaired(CORNERS, TETRAHEDRON[:1])
-    assert one.faces.tolist() == [[0, 2, 1], [1, 2, 0]]
+    assert one.faces.tolist() == [[0, 2, 1], [0, 1, 2]]
     assert len(one.vertices) == 3
     # That is what it is then.
     assert repaired(one.vertices, one.faces).open_edges == 0
