@@ -20,7 +20,7 @@ class ForeignImage:
 
     Attributes:
         name: its path or file name; None: it has a number only.
-        number: that stands for it; None: it has a name.
+        number: that stands for it where it has no name.
         is_index: whether the number counts the images from 0 in their order, rather than being in the image's name.
         size: width and height, pixels; None: the file does not say.
         K: fx, fy, cx, cy, OpenCV's pixels; None: the file does not say.

@@ -109,7 +109,7 @@ def _boxes(
     objects = [(number, i, one) for number, them in truth.items() for i, one in enumerate(them)]
     Ts_camera_model = object_poses(truth_file, objects)
     models_file = find_models(scene, options)
-    models = {} if models_file is None else read_models(models_file)
+    models = {} if models_file is None else read_models(models_file, options)
     boxes: list[RecordedBox] = []
     unplaced: list[SkippedFrame] = []
     names: list[str] = []
@@ -131,4 +131,4 @@ def _boxes(
             else:
                 first = f"{model.class_name}, first in image {images[place.rows[0]]}"
                 unplaced.append(SkippedFrame(first, place.problem, str(truth_file)))
-    return tuple(names), tuple(boxes), tuple(unplaced)
+    return tuple(dict.fromkeys(names)), tuple(boxes), tuple(unplaced)

@@ -120,6 +120,34 @@ def test_a_bop_scene_becomes_boxes_where_they_are(
     assert (store.state(sid).boxes, list(store.state(sid).classes)) == ({}, [0])
 
 
+def test_a_bop_dataset_of_this_program_says_what_its_images_and_objects_are(
+    bop_scene: ModuleType, ring_scene: ModuleType, store: SessionStore, sid: str, take, tmp_path: Path
+) -> None:
+    """Images are numbered anew in it, a model need not fill its box, and two sizes of a class are two models."""
+    scene = bop_scene.write(ring_scene, tmp_path / "bop", frames=12, images=False, models=bop_scene.CENTRED)
+    objects: dict[str, Any] = {}
+    for obj_id in ("1", "7"):
+        model = bop_scene.CENTRED[obj_id]
+        size = [model["size_x"] + 2, model["size_y"] + 2, model["size_z"] + 2]
+        objects[obj_id] = {"class": "cup", "shape": "hull", "size_mm": size, "boxes": []}
+    (tmp_path / "bop" / "objects.json").write_text(json.dumps(objects))
+    # Backwards: image i is frame 11 - i.
+    (tmp_path / "bop" / "frames.txt").write_text("".join(f"{i:06d} ring!{11 - i:05d}.jpg\n" for i in range(12)))
+    for name in ("scene_gt.json", "scene_camera.json"):
+        content = json.loads((scene / name).read_text())
+        val = tmp_path / "bop" / "val" / "000001"
+        val.mkdir(parents=True, exist_ok=True)
+        turned = {str(11 - int(i)): one for i, one in content.items()}
+        (scene / name).write_text(json.dumps({i: one for i, one in turned.items() if int(i) >= 4}))
+        (val / name).write_text(json.dumps({i: one for i, one in turned.items() if int(i) < 4}))
+    made = take(tmp_path / "bop")
+    assert (made.boxes, made.left_out, made.new_classes) == (3, (), ())
+    first = store.state(sid).boxes[1]
+    assert (first.class_id, first.name) == (0, "cup")
+    np.testing.assert_allclose(first.box.size, [0.062, 0.042, 0.082])
+    np.testing.assert_allclose(first.box.T_world_box[:3, 2:], bop_scene.OBJECTS[0][1].T_world_box[:3, 2:], atol=1e-9)
+
+
 def test_poses_that_are_a_little_off_give_the_middle(
     bop_scene: ModuleType, ring_scene: ModuleType, store: SessionStore, sid: str, take, tmp_path: Path
 ) -> None:

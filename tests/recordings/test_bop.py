@@ -112,7 +112,6 @@ def test_damage_is_named_with_its_place(scene: Path, file: str, change: Callable
         (lambda m: m["1"].update(min_z=float("inf")), "model 1: min_x, min_y, min_z must be finite"),
         (lambda m: m["1"]["symmetries_discrete"][0].__setitem__(0, 5.0), "symmetries_discrete[0]: not a rotation"),
         (lambda m: m["7"]["symmetries_continuous"][0].update(axis=[0, 0, 0]), "must have a direction"),
-        (lambda m: (m["1"].update(name="cup"), m["7"].update(name="cup")), "two models have one name"),
     ],
 )
 def test_damaged_models_are_named(scene: Path, change: Callable[[Any], object], said: str) -> None:

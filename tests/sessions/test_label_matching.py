@@ -45,6 +45,11 @@ def test_an_exact_name_goes_before_one_that_fits() -> None:
     assert found.problems == {0: TWO_IMAGES}
 
 
+def test_a_name_that_comes_twice_is_no_frames() -> None:
+    found = match(["1.png", "2.png"], *named("1.png", "1.png", "2.png"))
+    assert (found.frames, found.problems) == ({2: 1}, {0: TWO_IMAGES, 1: TWO_IMAGES})
+
+
 @pytest.mark.parametrize(
     ("names", "images", "frames", "how"),
     [
