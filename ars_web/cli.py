@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ars_web import arguments as take
-from ars_web import box_commands, kernel_cache, label_commands
+from ars_web import box_commands, class_commands, kernel_cache, label_commands
 from ars_web.errors import ArsError
 from ars_web.terminal import has_screen, note, open_browser, print_json, print_table, progress
 
@@ -41,6 +41,7 @@ app = typer.Typer(
     context_settings={"max_content_width": 120},
 )
 app.add_typer(box_commands.app, name="boxes")
+app.add_typer(class_commands.app, name="classes")
 app.add_typer(label_commands.app, name="labels")
 
 
@@ -203,11 +204,13 @@ def export(
     split_seed: take.SplitSeed = None,
     merge: take.Merge = None,
     workers: take.Workers = None,
+    check: take.Check = False,
     sessions: take.Sessions = take.SESSIONS,
     as_json: take.Json = False,
 ) -> None:
     """Write a training set. Ctrl-C stops it; the same command then goes on from there."""
     from ars_web.datasets.jobs import plan_export, run_export
+    from ars_web.datasets.readback.comparison import compare
     from ars_web.datasets.registry import WRITERS
     from ars_web.sessions.store import SessionStore
 
@@ -241,14 +244,21 @@ def export(
     except KeyboardInterrupt:
         note("ars-web: stopped; the same command goes on from here")
         raise typer.Exit(INTERRUPTED) from None
+    checked = compare(plan, plan.out) if check else None
     if as_json:
-        print_json({"out": plan.out, "report": report.model_dump(mode="json")})
-        return
-    rows = [(name, s.images, s.negatives, s.labels) for name, s in report.splits.items()]
-    print_table(("split", "images", "without a label", "labels"), rows)
-    dropped = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in report.dropped.items() if count)
-    print(f"dropped: {dropped or 'none'}")
-    print(plan.out)
+        print_json({"out": plan.out, "report": report.model_dump(mode="json"), "check": checked})
+    else:
+        rows = [(name, s.images, s.negatives, s.labels) for name, s in report.splits.items()]
+        print_table(("split", "images", "without a label", "labels"), rows)
+        dropped = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in report.dropped.items() if count)
+        print(f"dropped: {dropped or 'none'}")
+        for loss in report.losses:
+            print(f"lost: {loss}")
+        if checked is not None:
+            print(*checked.lines(), sep="\n")
+        print(plan.out)
+    if checked is not None and not checked.agrees:
+        raise typer.Exit(1)
 
 
 @app.command()
@@ -256,6 +266,9 @@ def preview(
     session: take.Session,
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the pictures.")],
     frames: Annotated[int, typer.Option("--frames", metavar="N", min=1, help="How many.")] = 6,
+    kind: Annotated[
+        str | None, typer.Option("--format", metavar="FORMAT", help="Draw what this format holds of each label.")
+    ] = None,
     sessions: take.Sessions = take.SESSIONS,
     as_json: take.Json = False,
 ) -> None:
@@ -265,7 +278,7 @@ def preview(
 
     with SessionStore(sessions) as store:
         snapshot = store.snapshot(store.find(session))
-    pictures = draw(snapshot, out, count=frames)
+    pictures = draw(snapshot, out, count=frames, format=kind)
     if as_json:
         print_json(pictures)
     else:

@@ -7,8 +7,11 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from ars_web.api.problems import ProblemResponse
 
-UPLOADS = re.compile(r"/api/(?:sessions/upload|imports/uploads|sessions/[^/]+/labels/upload)")
-"""Paths that are read piece by piece by their handlers, which count for themselves."""
+UPLOAD_PATHS = re.compile(r"/api/(?:sessions/upload|imports/uploads|sessions/[^/]+/labels/upload)")
+"""Read piece by piece by their handlers, which count for themselves."""
+
+MESH_PATHS = re.compile(r"/api/sessions/[^/]+/(?:classes|boxes)/[^/]+/mesh")
+"""The same, where they are sent."""
 
 
 class BodyLimit:
@@ -20,7 +23,7 @@ class BodyLimit:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass on with the body in hand, or answer 413."""
-        if scope["type"] != "http" or UPLOADS.fullmatch(scope["path"]):
+        if scope["type"] != "http" or _counts_itself(scope["path"]):
             await self.app(scope, receive, send)
             return
         declared = Headers(scope=scope).get("content-length", "0")
@@ -44,3 +47,7 @@ class BodyLimit:
             return held.pop() if held else await receive()
 
         await self.app(scope, replay, send)
+
+
+def _counts_itself(path: str) -> bool:
+    return any(paths.fullmatch(path) for paths in (UPLOAD_PATHS, MESH_PATHS))

@@ -102,7 +102,7 @@ class ExportOptions(_Strict):
             **_meanings(
                 box="the virtual box, also of objects that have a hull",
                 hull="the visual hull of the object's masks, where there is one; else the box",
-                mesh="the class's mesh",
+                mesh="the mesh of the object or its class, where there is one; else the hull, else the box",
             ),
             "x-null-means": "hull",
         },

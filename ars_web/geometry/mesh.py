@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Int
+from manifold3d import Manifold
 
 from ars_web.errors import BadInput
 
@@ -73,6 +74,17 @@ class Mesh:
         """Centre and radius of a sphere round all vertices."""
         centre = (self.vertices_world.min(axis=0) + self.vertices_world.max(axis=0)) / 2
         return centre, float(np.linalg.norm(self.vertices_world - centre, axis=1).max())
+
+    @cached_property
+    def hull_vertices_world(self) -> Float[np.ndarray, "h 3"]:
+        """Those vertices that span the convex hull; all that faces have where a mesh is flat."""
+        used = self.vertices_world[np.unique(self.faces)]
+        centre, radius = self.sphere
+        # Of the size 1 about the origin: what manifold3d takes for flat depends on both.
+        hull = Manifold.hull_points((used - centre) / radius).to_mesh64() if radius > 0.0 else None
+        if hull is None or len(hull.vert_properties) == 0:
+            return used
+        return np.ascontiguousarray(hull.vert_properties[:, :3] * radius + centre)
 
 
 def edges_of_faces(faces: Int[np.ndarray, "f 3"]) -> Int[np.ndarray, "e 4"]:

@@ -29,7 +29,8 @@ def test_all_writers_are_described_with_their_options(formats: dict[str, Any]) -
     for writer in formats["writers"]:
         assert writer["title"]
         assert writer["description"].endswith(".")
-        assert writer["shapes"] == ["box", "hull"]
+        assert writer["shapes"] == ["box", "hull", "mesh"]
+        assert writer["shows"]
         assert [option["name"] for option in writer["options"]] == [option.name for option in export_options()]
     options = {option["name"]: option for option in formats["writers"][0]["options"]}
     assert [choice["value"] for choice in options["images"]["choices"]] == ["link", "copy", "rectify", "none"]

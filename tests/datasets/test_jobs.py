@@ -18,7 +18,8 @@ import pytest
 from ars_web.datasets import assembly, jobs, worker
 from ars_web.datasets.jobs import partial_folder, run_export
 from ars_web.datasets.options import ExportOptions
-from ars_web.datasets.plan import ExportPlan, plan_export
+from ars_web.datasets.plan import plan_export
+from ars_web.datasets.planned import ExportPlan
 from ars_web.datasets.registry import WRITERS
 from ars_web.datasets.worker import export_shard, start_worker
 from ars_web.errors import ArsError, BadFile, BadInput, Cancelled, StoreError

@@ -60,8 +60,8 @@ def test_every_choice_can_be_made_and_says_what_it_means(option: ExportOption) -
         ExportOptions.model_validate(given(option.name, choice.value))
 
 
-def test_the_shape_that_nobody_chose_is_the_hull_and_meshes_are_not_offered() -> None:
+def test_the_shape_that_nobody_chose_is_the_hull() -> None:
     shape = OPTIONS["shape"]
     assert ExportOptions.model_validate({}).shape is None
     assert (shape.default, shape.optional) == ("hull", False)
-    assert [choice.value for choice in shape.choices] == ["box", "hull"]
+    assert [choice.value for choice in shape.choices] == ["box", "hull", "mesh"]

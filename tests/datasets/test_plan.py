@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from ars_web.datasets.options import ExportOptions, FrameChoice
-from ars_web.datasets.plan import ExportPlan, plan_export
+from ars_web.datasets.plan import plan_export
 from ars_web.datasets.plan_files import digest_of, read_digest, read_plan, write_plan
+from ars_web.datasets.planned import ExportPlan
 from ars_web.errors import BadFile, BadInput
 from ars_web.sessions.model import SessionSnapshot
 

@@ -54,3 +54,18 @@ def test_an_edge_of_four_faces_is_allowed():
 def test_what_is_no_closed_mesh_is_refused(vertices, faces, message):
     with pytest.raises(BadInput, match=message):
         Mesh(vertices, faces)
+
+
+def test_the_convex_hulls_vertices_reach_as_far_as_all_vertices_in_every_direction():
+    random = np.random.default_rng(0)
+    ball = random.normal(size=(300, 3)) @ random.normal(size=(3, 3)) * 0.01 + [500, -20, 3]
+    flat = np.column_stack([random.normal(size=(300, 2)), np.ones(300)]) @ random.normal(size=(3, 3))
+    directions = random.normal(size=(200, 3))
+    for points in (ball, flat):
+        # Any faces, once each way round, that have all vertices but the last, which belongs to none.
+        faces = np.arange(300).reshape(-1, 3)
+        mesh = Mesh(np.concatenate([points, [[1e4, 0, 0]]]), np.concatenate([faces, faces[:, ::-1]]))
+        found = mesh.hull_vertices_world
+        assert len(found) < 100
+        reach = np.abs((points @ directions.T).max(axis=0) - (found @ directions.T).max(axis=0))
+        assert reach.max() < 1e-9 * np.ptp(points, axis=0).max()

@@ -216,6 +216,7 @@ WRITER = Writer(
     image_folder=lambda split: "images",
     write=_write,
     join=_join,
+    shows=("outline", "box"),
     with_visible=True,
     with_outlines=True,
 )
