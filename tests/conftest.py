@@ -45,6 +45,7 @@ install_import_hook(
             "hull_box",
             "mesh_silhouette",
             "resting_objects",
+            "symmetry_of_turns",
             "projected_points",
             "convex_outlines",
             "rings",

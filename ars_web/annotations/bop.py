@@ -80,10 +80,7 @@ def read(file: Path, options: ReadOptions) -> ForeignLabels:
             poses.append(ForeignPose(places[number], str(one.obj_id), T, where))
         else:
             left_out.append(LeftOut(_NO_MODEL, where))
-    kinds = {
-        str(obj_id): ForeignModel(m.class_name, m.size, m.T_model_box, m.rotations, m.axis)
-        for obj_id, m in models.items()
-    }
+    kinds = {str(obj_id): ForeignModel(m.class_name, m.size, m.T_model_box, m.symmetry) for obj_id, m in models.items()}
     return ForeignLabels("bop", file, tuple(images), kinds, tuple(poses), left_out=tuple(left_out))
 
 

@@ -124,7 +124,7 @@ def _boxes(
         images = np.array([objects[k][0] for k in own], dtype=np.int64)
         Ts_world_camera = poses.Ts[[rows[number] for number in images.tolist()]]
         Ts_world_box = Ts_world_camera @ Ts_camera_model[own] @ model.T_model_box
-        placed = resting_objects(images, Ts_world_box, size=model.size, rotations=model.rotations, axis=model.axis)
+        placed = resting_objects(images, Ts_world_box, size=model.size, symmetry=model.symmetry)
         for place in placed:
             if place.problem is None:
                 boxes.append(RecordedBox(model.class_name, Box(place.T_world_box, model.size)))

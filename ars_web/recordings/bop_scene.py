@@ -24,8 +24,9 @@ from pydantic import BaseModel, ConfigDict, Field, RootModel, ValidationError
 from ars_web.errors import BadFile, BadInput
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import checked_size
-from ars_web.geometry.resting_objects import is_about
 from ars_web.geometry.rigid_transform import Transform
+from ars_web.geometry.symmetry import Symmetry
+from ars_web.geometry.symmetry_of_turns import symmetry_of_turns
 from ars_web.recordings.json_file import parse_json
 from ars_web.recordings.number_rows import file_bytes
 from ars_web.recordings.options import ReadOptions
@@ -113,15 +114,13 @@ class BopModel:
         class_name: what objects.json or models_info.json calls it, else `obj_000001` after its files.
         size: (3,) metres, of its box along its own axes.
         T_model_box: the box's centre in the model's frame, metres; the axes are the same.
-        rotations: (m, 3, 3) turns about the box's centre that leave it looking the same, the identity first.
-        axis: (3,) of unit length, about which any turn does; None: there is none.
+        symmetry: in the box's frame.
     """
 
     class_name: str
     size: Float[np.ndarray, "3"]
     T_model_box: Transform
-    rotations: Float[np.ndarray, "m 3 3"]
-    axis: Float[np.ndarray, "3"] | None
+    symmetry: Symmetry
 
 
 def read_cameras(file: Path) -> dict[int, SceneCamera]:
@@ -256,7 +255,7 @@ def _model(file: Path, obj_id: int, info: _ModelInfo) -> BopModel:
         except BadInput as error:
             raise BadFile(file, f"{what}: {error}") from error
         moved = np.linalg.norm(T[:3, :3] @ centre + T[:3, 3] - centre)
-        if moved <= OFF_CENTRE * np.linalg.norm(sides) and not is_about(rotations, T[:3, :3]):
+        if moved <= OFF_CENTRE * np.linalg.norm(sides):
             rotations.append(T[:3, :3])
     for place, turning in enumerate(info.symmetries_continuous):
         what = f"model {obj_id}: symmetries_continuous[{place}].axis"
@@ -266,13 +265,12 @@ def _model(file: Path, obj_id: int, info: _ModelInfo) -> BopModel:
             raise BadFile(file, f"{what} must have a direction, not {turning.axis}")
         # A second axis makes a ball of it, of which no turn means anything; one is enough to place it.
         axis = np.array(turning.axis) / length if axis is None else axis
-    return BopModel(
-        (info.name or "").strip() or f"obj_{obj_id:06d}",
-        size,
-        rigid_transform.from_rotation(np.eye(3), centre * MILLIMETRE),
-        np.array(rotations),
-        axis,
-    )
+    try:
+        symmetry = symmetry_of_turns(np.array(rotations), axis=axis)
+    except BadInput as error:
+        raise BadFile(file, f"model {obj_id}: symmetries_discrete: {error}") from error
+    T_model_box = rigid_transform.from_rotation(np.eye(3), centre * MILLIMETRE)
+    return BopModel((info.name or "").strip() or f"obj_{obj_id:06d}", size, T_model_box, symmetry)
 
 
 def _transforms(file: Path, named: Sequence[tuple[str, str, Sequence[float], Sequence[float]]]) -> CheckedPoses:

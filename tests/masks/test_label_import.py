@@ -15,6 +15,7 @@ from ars_web.errors import BadFile, BadInput
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box, iou
 from ars_web.geometry.labels import labels_of_boxes, outline
+from ars_web.geometry.symmetry import Symmetry
 from ars_web.masks.label_import import MOST_VIEWS, ImportedLabels, LabelImport
 from ars_web.recordings.registry import read_recording
 from ars_web.sessions.editing import SessionEditor
@@ -107,6 +108,9 @@ def test_a_bop_scene_becomes_boxes_where_they_are(
     assert (made.boxes, made.masks, made.left_out) == (3, 0, ())
     assert made.new_classes == ("obj_000001", "obj_000007")
     state = store.state(sid)
+    z = (0.0, 0.0, 1.0)
+    assert state.classes[1].symmetry == Symmetry("discrete", ((z, 2),))
+    assert state.classes[2].symmetry == Symmetry("continuous", axis=z)
     assert [(box.name, box.class_id) for box in state.boxes.values()] == [
         ("obj_000001", 1),
         ("obj_000001 2", 1),
@@ -146,6 +150,16 @@ def test_a_bop_dataset_of_this_program_says_what_its_images_and_objects_are(
     assert (first.class_id, first.name) == (0, "cup")
     np.testing.assert_allclose(first.box.size, [0.062, 0.042, 0.082])
     np.testing.assert_allclose(first.box.T_world_box[:3, 2:], bop_scene.OBJECTS[0][1].T_world_box[:3, 2:], atol=1e-9)
+
+
+def test_a_class_that_is_there_keeps_its_symmetry(
+    bop_scene: ModuleType, ring_scene: ModuleType, store: SessionStore, sid: str, take, tmp_path: Path
+) -> None:
+    SessionEditor(store).add_class(sid, name="obj_000007", author="ana")
+    made = take(bop_scene.write(ring_scene, tmp_path / "bop", images=False))
+    assert made.new_classes == ("obj_000001",)
+    assert store.state(sid).classes[1].symmetry.kind == "none"
+    assert made.notes[1:] == ("The class obj_000007 keeps the symmetry that it has; the file says another.",)
 
 
 def test_poses_that_are_a_little_off_give_the_middle(
