@@ -27,6 +27,17 @@ MODELS: dict[str, dict[str, Any]] = {
 }
 
 
+CENTRED: dict[str, dict[str, Any]] = {
+    "1": {
+        "diameter": 112.2,
+        **{"min_x": -30.0, "min_y": -20.0, "min_z": -40.0, "size_x": 60.0, "size_y": 40.0, "size_z": 80.0},
+        "symmetries_discrete": [[-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]],
+    },
+    "7": MODELS["7"],
+}
+"""The same with their origins at their boxes' centres, as this program writes them."""
+
+
 def box(obj_id: int, x: float, y: float, turn: float, tilt: float = 0.0) -> Box:
     """Where an object of a model is, as we say it."""
     model = MODELS[str(obj_id)]
@@ -43,9 +54,11 @@ OBJECTS: tuple[tuple[int, Box], ...] = (
 )
 
 
-def truth_of(T_world_camera: np.ndarray, obj_id: int, T_world_box: np.ndarray) -> dict[str, Any]:
+def truth_of(
+    T_world_camera: np.ndarray, obj_id: int, T_world_box: np.ndarray, models: dict[str, dict[str, Any]] = MODELS
+) -> dict[str, Any]:
     """An object as scene_gt.json has it."""
-    model = MODELS[str(obj_id)]
+    model = models[str(obj_id)]
     lowest = np.array([model["min_x"], model["min_y"], model["min_z"]])
     centre = lowest + np.array([model["size_x"], model["size_y"], model["size_z"]]) / 2
     T_world_model = T_world_box @ rigid_transform.from_rotation(np.eye(3), -centre / 1000)
@@ -65,12 +78,13 @@ def write(
     objects: Sequence[tuple[int, Box]] = OBJECTS,
     with_world: bool = True,
     images: bool = True,
+    models: dict[str, dict[str, Any]] = MODELS,
 ) -> Path:
     """The dataset in `folder`; its scene's folder. A symmetric object is turned as it likes from image to image."""
     scene = folder / "test" / "000001"
     scene.mkdir(parents=True)
     (folder / "models").mkdir()
-    (folder / "models" / "models_info.json").write_text(json.dumps(MODELS, indent=1))
+    (folder / "models" / "models_info.json").write_text(json.dumps(models, indent=1))
     cameras: dict[str, Any] = {}
     truth: dict[str, Any] = {}
     picture = np.full((ring.HEIGHT, ring.WIDTH, 3), 90, dtype=np.uint8)
@@ -85,7 +99,7 @@ def write(
         for obj_id, one in objects:
             alike = rigid_transform.rotation_about_z(np.pi * (i % 2) if obj_id == 1 else 0.7 * i)
             T_world_box = one.T_world_box @ rigid_transform.from_rotation(alike, np.zeros(3))
-            truth[str(i)].append(truth_of(T, obj_id, T_world_box))
+            truth[str(i)].append(truth_of(T, obj_id, T_world_box, models))
         if images:
             (scene / "rgb").mkdir(exist_ok=True)
             assert cv2.imwrite(str(scene / "rgb" / f"{i:06d}.png"), picture)

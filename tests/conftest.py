@@ -44,6 +44,8 @@ install_import_hook(
             "visual_hull",
             "hull_box",
             "mesh_silhouette",
+            "resting_objects",
+            "symmetry_of_turns",
             "projected_points",
             "convex_outlines",
             "rings",
@@ -53,7 +55,6 @@ install_import_hook(
             "two_sided",
             "flat_mesh",
             "box_mesh",
-            "resting_objects",
         )
     ],
     "beartype.beartype",

@@ -33,9 +33,7 @@ from ars_web.recordings.options import ReadOptions
 TITLE = "COCO instances"
 NEEDS = "a JSON file with images, annotations and categories"
 
-PARTS = "instances_"
-"""How names of files begin that are parts of one set: instances_train.json, instances_val.json."""
-
+_PARTS = "instances_"
 _OF_BOP = "scene_gt"
 
 _CROWD = (
@@ -107,6 +105,11 @@ def find(path: Path) -> list[Path]:
         # A BOP scene has its boxes as COCO, too, which say less than its poses.
         return [file for file in files if not file.name.startswith(_OF_BOP) and _is_one(file)]
     return [path] if _is_one(path) else []
+
+
+def are_parts(files: Sequence[Path]) -> bool:
+    """Whether files are the splits of one set: instances_train.json, instances_val.json."""
+    return all(file.name.startswith(_PARTS) for file in files)
 
 
 def _is_one(file: Path) -> bool:

@@ -8,7 +8,7 @@ for video   <track label> with a shape for each frame, which are one object; out
             names
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -44,6 +44,11 @@ def find(path: Path) -> list[Path]:
     if path.is_dir():
         return [file for file in sorted(path.glob("*.xml")) if _is_one(file)]
     return [path] if path.is_file() and _is_one(path) else []
+
+
+def are_parts(files: Sequence[Path]) -> bool:
+    """Whether files are parts of one set: CVAT numbers tracks and frames anew in each."""
+    return len(files) == 1
 
 
 def _is_one(file: Path) -> bool:

@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from ars_web.geometry.polygon import Polygon
 from ars_web.geometry.rigid_transform import Transform
+from ars_web.geometry.symmetry import NO_SYMMETRY, Symmetry
 
 INSTANCE_NAMES = ("track_id", "instance_id", "object_id")
 """What programs call the number that an object has in all images."""
@@ -20,7 +21,7 @@ class ForeignImage:
 
     Attributes:
         name: its path or file name; None: it has a number only.
-        number: that stands for it; None: it has a name.
+        number: that stands for it where it has no name.
         is_index: whether the number counts the images from 0 in their order, rather than being in the image's name.
         size: width and height, pixels; None: the file does not say.
         K: fx, fy, cx, cy, OpenCV's pixels; None: the file does not say.
@@ -46,20 +47,13 @@ class ForeignModel:
         class_name: of its class.
         size: (3,) metres, along its box's own axes.
         T_object_box: the box's centre and axes in the frame that poses are of.
-        rotations: (m, 3, 3) turns in the box's frame that leave it looking the same, the identity first.
-        axis: (3,) of unit length, about which any turn does; None: there is none.
+        symmetry: in the box's frame.
     """
 
     class_name: str
     size: Float[np.ndarray, "3"]
     T_object_box: Transform
-    rotations: Float[np.ndarray, "m 3 3"]
-    axis: Float[np.ndarray, "3"] | None = None
-
-    @property
-    def is_symmetric(self) -> bool:
-        """Whether any turn leaves it looking the same."""
-        return self.axis is not None or len(self.rotations) > 1
+    symmetry: Symmetry = NO_SYMMETRY
 
 
 @dataclass(frozen=True, eq=False)

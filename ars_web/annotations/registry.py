@@ -1,6 +1,6 @@
 """The readers of labels by format, and finding a file's format by looking at it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,7 +26,7 @@ class Reader:
         find: its files at a path that exists: the file itself, those in the folder; none where it does not look like
             this format.
         read: reads one of them, whole and sound, or raises.
-        parts: how the names of files begin that are parts of one set, divided by images; None: no set has parts.
+        are_parts: whether several files that `find` found are parts of one set, divided by images.
     """
 
     format: str
@@ -34,13 +34,13 @@ class Reader:
     needs: str
     find: Callable[[Path], list[Path]]
     read: Callable[[Path, ReadOptions], ForeignLabels]
-    parts: str | None = None
+    are_parts: Callable[[Sequence[Path]], bool]
 
 
 READERS: dict[str, Reader] = {
-    "bop": Reader("bop", bop.TITLE, bop.NEEDS, bop.find, bop.read),
-    "coco": Reader("coco", coco.TITLE, coco.NEEDS, coco.find, coco.read, parts=coco.PARTS),
-    "cvat": Reader("cvat", cvat.TITLE, cvat.NEEDS, cvat.find, cvat.read),
+    "bop": Reader("bop", bop.TITLE, bop.NEEDS, bop.find, bop.read, bop.are_parts),
+    "coco": Reader("coco", coco.TITLE, coco.NEEDS, coco.find, coco.read, coco.are_parts),
+    "cvat": Reader("cvat", cvat.TITLE, cvat.NEEDS, cvat.find, cvat.read, cvat.are_parts),
 }
 
 
@@ -80,8 +80,8 @@ def _of_one_set(path: Path, format: str) -> tuple[Reader, list[Path]]:  # noqa: 
         known = "; ".join(f"{reader.format}: {reader.title}, {reader.needs}" for reader in readers)
         raise BadInput(f"{path} holds no labels that are known. Known are: {known}")
     first = found[0][0]
-    are_parts = first.parts is not None and all(r is first and f.name.startswith(first.parts) for r, f in found)
+    are_parts = all(reader is first for reader, _ in found) and first.are_parts([file for _, file in found])
     if len(found) > 1 and not are_parts:
-        files = ", ".join(f"{file.relative_to(path) if path.is_dir() else file} ({r.format})" for r, file in found)
-        raise BadInput(f"{path} holds several: {files}; give the one that is meant")
+        named = ", ".join(f"{file.relative_to(path)} ({reader.format})" for reader, file in found)
+        raise BadInput(f"{path} holds several: {named}; give the one that is meant")
     return first, [file for _, file in found]

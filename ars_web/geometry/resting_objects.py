@@ -4,7 +4,6 @@ Several objects of one kind are told apart by where they are. Poses are noisy, s
 that looks the same from several sides differ by its symmetry.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +11,7 @@ from jaxtyping import Float, Int
 
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.rigid_transform import Transform
+from ars_web.geometry.symmetry import NO_SYMMETRY, Symmetry, rotations_of
 
 MOVED = 0.010
 """Metres. An object whose poses are farther than this from their middle, in the median, does not rest."""
@@ -64,8 +64,7 @@ def resting_objects(
     Ts_world_box: Float[np.ndarray, "n 4 4"],
     *,
     size: Float[np.ndarray, "3"],
-    rotations: Float[np.ndarray, "m 3 3"],
-    axis: Float[np.ndarray, "3"] | None = None,
+    symmetry: Symmetry = NO_SYMMETRY,
 ) -> list[RestingObject]:
     """The objects of one kind that n poses are of, in the order in which they are first seen.
 
@@ -75,9 +74,9 @@ def resting_objects(
     Args:
         images: (n,) of which image each pose is; ascending.
         size: metres, of the kind's box.
-        rotations: turns about the box's centre, in its frame, that leave it looking the same; the identity first.
-        axis: unit length, in its frame, about which any turn does, too.
+        symmetry: of the kind, in its box's frame.
     """
+    rotations, axis = rotations_of(symmetry), None if symmetry.axis is None else np.array(symmetry.axis)
     tracks = _tracks(images, Ts_world_box[:, :3, 3], reach=float(np.linalg.norm(size)) / 2)
     most_at_once = int(np.unique(images, return_counts=True)[1].max(initial=0))
     many_places = len(np.unique(images)) >= 3 and len(tracks) > most_at_once
@@ -170,8 +169,3 @@ def _angles(Rs: Float[np.ndarray, "k 3 3"], reference: Float[np.ndarray, "3 3"])
     # From the chord, which is exact near zero where the trace is not: |A - B| = 2 sqrt 2 sin(angle / 2).
     chords: np.ndarray = np.linalg.norm(Rs - reference, axis=(1, 2))
     return 2 * np.arcsin(np.clip(chords / (2 * np.sqrt(2)), 0.0, 1.0))
-
-
-def is_about(Rs: Sequence[np.ndarray], R: np.ndarray) -> bool:
-    """Whether one of the rotations is `R`, to a thousandth."""
-    return any(float(np.abs(other - R).max()) < 1e-3 for other in Rs)

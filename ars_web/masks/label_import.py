@@ -25,7 +25,7 @@ from ars_web.sessions.editing import SessionEditor
 from ars_web.sessions.edits import BoxChange, ClassChange, Edit
 from ars_web.sessions.label_editing import ObjectLabels, object_ids
 from ars_web.sessions.label_import import PlannedObject, planned_labels
-from ars_web.sessions.model import HullOptions
+from ars_web.sessions.model import HullOptions, ObjectClass
 from ars_web.sessions.object_drafting import MaskDraft
 from ars_web.sessions.store import SessionStore
 
@@ -153,7 +153,8 @@ class LabelImport:
         made = [_made(taken, one) for one in plan.objects]
         coming = [one for one in made if one.labels is not None]
         drafts = [one.labels for one in coming if one.labels is not None]
-        classes = {a_class.name for a_class in self._store.state(sid).classes.values()}
+        classes = {a_class.name: a_class for a_class in self._store.state(sid).classes.values()}
+        notes = [*plan.notes, *_kept_symmetries(drafts, classes)]
         new_classes = tuple(dict.fromkeys(d.class_name for d in drafts if d.class_name not in classes))
         edit = None
         if not dry_run:
@@ -171,7 +172,7 @@ class LabelImport:
             _imported(coming, edit),
             new_classes if edit is None else _added_classes(edit),
             reasons((*plan.left_out, *(left for one in made for left in one.left_out))),
-            plan.notes if drafts else (*plan.notes, NOTHING),
+            (*notes, *(() if drafts else (NOTHING,))),
         )
 
 
@@ -195,9 +196,16 @@ def reasons(left_out: Sequence[LeftOut]) -> tuple[Reason, ...]:
     return tuple(Reason(reason, count, tuple(examples[reason])) for reason, count in counts.most_common())
 
 
+def _kept_symmetries(drafts: Sequence[ObjectLabels], classes: Mapping[str, ObjectClass]) -> list[str]:
+    """Which classes that were there have another symmetry than the file says: people may have set it."""
+    given = {d.class_name: d.symmetry for d in drafts if d.symmetry.kind != "none" and d.class_name in classes}
+    other = [name for name, symmetry in given.items() if classes[name].symmetry != symmetry]
+    return [f"The class {name} keeps the symmetry that it has; the file says another." for name in other]
+
+
 def _made(taken: Photographs, one: PlannedObject) -> _Made:
     if one.box is not None:
-        return _Made(ObjectLabels(one.class_name, one.box), "poses", "", ())
+        return _Made(ObjectLabels(one.class_name, one.box, symmetry=one.symmetry), "poses", "", ())
     if not one.outlines:
         return _of_rectangles(taken, one)
     made = _of_outlines(taken, one)

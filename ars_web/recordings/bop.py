@@ -109,7 +109,7 @@ def _boxes(
     objects = [(number, i, one) for number, them in truth.items() for i, one in enumerate(them)]
     Ts_camera_model = object_poses(truth_file, objects)
     models_file = find_models(scene, options)
-    models = {} if models_file is None else read_models(models_file)
+    models = {} if models_file is None else read_models(models_file, options)
     boxes: list[RecordedBox] = []
     unplaced: list[SkippedFrame] = []
     names: list[str] = []
@@ -124,11 +124,11 @@ def _boxes(
         images = np.array([objects[k][0] for k in own], dtype=np.int64)
         Ts_world_camera = poses.Ts[[rows[number] for number in images.tolist()]]
         Ts_world_box = Ts_world_camera @ Ts_camera_model[own] @ model.T_model_box
-        placed = resting_objects(images, Ts_world_box, size=model.size, rotations=model.rotations, axis=model.axis)
+        placed = resting_objects(images, Ts_world_box, size=model.size, symmetry=model.symmetry)
         for place in placed:
             if place.problem is None:
                 boxes.append(RecordedBox(model.class_name, Box(place.T_world_box, model.size)))
             else:
                 first = f"{model.class_name}, first in image {images[place.rows[0]]}"
                 unplaced.append(SkippedFrame(first, place.problem, str(truth_file)))
-    return tuple(names), tuple(boxes), tuple(unplaced)
+    return tuple(dict.fromkeys(names)), tuple(boxes), tuple(unplaced)

@@ -3,6 +3,8 @@
     scene_camera.json   by image number: cam_K (3 x 3 row by row, OpenCV's pixels), and where they are known
                         cam_R_w2c (3 x 3 row by row) and cam_t_w2c (millimetres): the camera from the world
     scene_gt.json       by image number: objects, each with obj_id, cam_R_m2c and cam_t_m2c: the camera from the model
+    objects.json        in a dataset of this program: by obj_id, the class and the box's size, which a model of another
+                        shape does not fill
     models_info.json    by obj_id: min_x ... size_z of the model's box, millimetres, in the model's own frame, whose
                         origin need not be the box's centre; symmetries_discrete and symmetries_continuous
 
@@ -12,18 +14,19 @@ Source: https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_form
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
-from pydantic import BaseModel, ConfigDict, RootModel
+from pydantic import BaseModel, ConfigDict, Field, RootModel, ValidationError
 
 from ars_web.errors import BadFile, BadInput
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import checked_size
-from ars_web.geometry.resting_objects import is_about
 from ars_web.geometry.rigid_transform import Transform
+from ars_web.geometry.symmetry import Symmetry
+from ars_web.geometry.symmetry_of_turns import symmetry_of_turns
 from ars_web.recordings.json_file import parse_json
 from ars_web.recordings.number_rows import file_bytes
 from ars_web.recordings.options import ReadOptions
@@ -32,6 +35,7 @@ from ars_web.recordings.pose_checks import CheckedPoses, poses_from_matrices
 CAMERA_FILE = "scene_camera.json"
 TRUTH_FILE = "scene_gt.json"
 MODELS_FILE = "models_info.json"
+OWN_OBJECTS_FILE = "objects.json"
 
 IMAGE_FOLDERS = ("rgb", "gray")
 IMAGE_ENDINGS = (".png", ".jpg", ".jpeg")
@@ -79,6 +83,17 @@ class _ModelInfo(_Part):
     symmetries_continuous: list[_Turning] = []
 
 
+class _OwnObject(_Part):
+    """What this program's objects.json has of an object; class is a word of Python's."""
+
+    class_name: str = Field(alias="class")
+    size_mm: tuple[float, float, float]
+
+
+class _OwnObjects(RootModel[dict[int, _OwnObject]]):
+    pass
+
+
 class _Cameras(RootModel[dict[int, SceneCamera]]):
     pass
 
@@ -96,18 +111,16 @@ class BopModel:
     """A kind of object.
 
     Attributes:
-        class_name: what models_info.json calls it, else `obj_000001` after its files.
+        class_name: what objects.json or models_info.json calls it, else `obj_000001` after its files.
         size: (3,) metres, of its box along its own axes.
         T_model_box: the box's centre in the model's frame, metres; the axes are the same.
-        rotations: (m, 3, 3) turns about the box's centre that leave it looking the same, the identity first.
-        axis: (3,) of unit length, about which any turn does; None: there is none.
+        symmetry: in the box's frame.
     """
 
     class_name: str
     size: Float[np.ndarray, "3"]
     T_model_box: Transform
-    rotations: Float[np.ndarray, "m 3 3"]
-    axis: Float[np.ndarray, "3"] | None
+    symmetry: Symmetry
 
 
 def read_cameras(file: Path) -> dict[int, SceneCamera]:
@@ -185,19 +198,42 @@ def find_models(scene: Path, options: ReadOptions) -> Path | None:
     return None
 
 
-def read_models(file: Path) -> dict[int, BopModel]:
+def read_models(file: Path, options: ReadOptions) -> dict[int, BopModel]:
     """The kinds of objects by obj_id.
 
     Raises:
-        BadFile: it is damaged, a model's box is none, a symmetry is no rigid transform, or two models have one name.
+        BadFile: it is damaged, a model's box is none, or a symmetry is no rigid transform.
+        RefusedPath: the objects.json beside it lies outside `options.within`.
     """
     models = {
         obj_id: _model(file, obj_id, info) for obj_id, info in parse_json(file, file_bytes(file), _Models).root.items()
     }
-    names = [model.class_name for model in models.values()]
-    if len(set(names)) != len(names):
-        raise BadFile(file, f"two models have one name: {', '.join(names)}")
-    return models
+    own = _own_objects(file.parent.parent, options)
+    return {obj_id: _as_own(model, own.get(obj_id)) for obj_id, model in models.items()}
+
+
+def _own_objects(dataset: Path, options: ReadOptions) -> dict[int, _OwnObject]:
+    """What this program's dataset says of its objects; nothing where it is another program's."""
+    file = dataset / OWN_OBJECTS_FILE
+    if options.within is not None and not dataset.resolve().is_relative_to(options.within.resolve()):
+        return {}
+    if not file.is_file():
+        return {}
+    try:
+        return _OwnObjects.model_validate_json(file_bytes(options.allowed(file))).root
+    except ValidationError:
+        return {}
+
+
+def _as_own(model: BopModel, own: _OwnObject | None) -> BopModel:
+    """A model as this program wrote it: in the frame of its box, whose centre is the origin."""
+    if own is None:
+        return model
+    try:
+        size = checked_size(np.array(own.size_mm) * MILLIMETRE)
+    except BadInput:
+        return model
+    return replace(model, class_name=own.class_name.strip() or model.class_name, size=size, T_model_box=np.eye(4))
 
 
 def _model(file: Path, obj_id: int, info: _ModelInfo) -> BopModel:
@@ -219,7 +255,7 @@ def _model(file: Path, obj_id: int, info: _ModelInfo) -> BopModel:
         except BadInput as error:
             raise BadFile(file, f"{what}: {error}") from error
         moved = np.linalg.norm(T[:3, :3] @ centre + T[:3, 3] - centre)
-        if moved <= OFF_CENTRE * np.linalg.norm(sides) and not is_about(rotations, T[:3, :3]):
+        if moved <= OFF_CENTRE * np.linalg.norm(sides):
             rotations.append(T[:3, :3])
     for place, turning in enumerate(info.symmetries_continuous):
         what = f"model {obj_id}: symmetries_continuous[{place}].axis"
@@ -229,13 +265,12 @@ def _model(file: Path, obj_id: int, info: _ModelInfo) -> BopModel:
             raise BadFile(file, f"{what} must have a direction, not {turning.axis}")
         # A second axis makes a ball of it, of which no turn means anything; one is enough to place it.
         axis = np.array(turning.axis) / length if axis is None else axis
-    return BopModel(
-        (info.name or "").strip() or f"obj_{obj_id:06d}",
-        size,
-        rigid_transform.from_rotation(np.eye(3), centre * MILLIMETRE),
-        np.array(rotations),
-        axis,
-    )
+    try:
+        symmetry = symmetry_of_turns(np.array(rotations), axis=axis)
+    except BadInput as error:
+        raise BadFile(file, f"model {obj_id}: symmetries_discrete: {error}") from error
+    T_model_box = rigid_transform.from_rotation(np.eye(3), centre * MILLIMETRE)
+    return BopModel((info.name or "").strip() or f"obj_{obj_id:06d}", size, T_model_box, symmetry)
 
 
 def _transforms(file: Path, named: Sequence[tuple[str, str, Sequence[float], Sequence[float]]]) -> CheckedPoses:

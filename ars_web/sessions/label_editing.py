@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 from ars_web.errors import BadInput
 from ars_web.geometry.box import Box
+from ars_web.geometry.symmetry import NO_SYMMETRY, Symmetry
 from ars_web.sessions.edit_json import request_digest
 from ars_web.sessions.edits import BoxChange, Change, ClassChange, Edit, MaskChange
 from ars_web.sessions.hull_mesh import HullMesh
@@ -26,6 +27,7 @@ class ObjectLabels:
         class_name: of a class that the session has, or that is added.
         hull, hull_options: of the box, where it was made of the masks.
         masks: at most one a frame.
+        symmetry: of its class, where that is added.
     """
 
     class_name: str
@@ -33,6 +35,7 @@ class ObjectLabels:
     hull: HullMesh | None = None
     hull_options: HullOptions | None = None
     masks: tuple[MaskDraft, ...] = ()
+    symmetry: Symmetry = NO_SYMMETRY
 
 
 class LabelEditing(ObjectEditing):
@@ -93,7 +96,8 @@ def _additions(state: SessionState, objects: Sequence[ObjectLabels]) -> tuple[Ch
         name = checked_name(one.class_name, what="a class")
         if name not in classes:
             color = next_color(a_class.color for a_class in classes.values())
-            classes[name] = ObjectClass(state.next_class_id + len(added), name, color, revision=revision)
+            id_ = state.next_class_id + len(added)
+            classes[name] = ObjectClass(id_, name, color, revision=revision, symmetry=one.symmetry)
             added.append(ClassChange(classes[name].id, None, classes[name]))
         class_id = classes[name].id
         if one.box is not None:

@@ -17,6 +17,7 @@ from ars_web.geometry.camera import Camera
 from ars_web.geometry.mask_regions import polygons_of, region
 from ars_web.geometry.polygon import Polygon
 from ars_web.geometry.resting_objects import resting_objects
+from ars_web.geometry.symmetry import NO_SYMMETRY, Symmetry
 from ars_web.sessions.label_matching import Matching, matched_images
 from ars_web.sessions.model import FrameTable
 from ars_web.sessions.names import checked_name
@@ -39,6 +40,7 @@ class PlannedObject:
     Attributes:
         class_name: as sessions keep it.
         box: where it is, as poses tell; None: they do not.
+        symmetry: of its class.
         outlines: by frame.
         rectangles: (4,) x0, y0, x1, y1 by frame, image coordinates.
         wheres: what the file calls its outlines and rectangles, or the first of its poses.
@@ -46,6 +48,7 @@ class PlannedObject:
 
     class_name: str
     box: Box | None = None
+    symmetry: Symmetry = NO_SYMMETRY
     outlines: Mapping[int, tuple[Polygon, ...]] = field(default_factory=dict[int, tuple[Polygon, ...]])
     rectangles: Mapping[int, Float[np.ndarray, "4"]] = field(default_factory=dict[int, np.ndarray])
     wheres: Mapping[int, str] = field(default_factory=dict[int, str])
@@ -91,14 +94,15 @@ def _posed(labels: ForeignLabels, matching: Matching, frames: FrameTable) -> tup
         rows = np.array([matching.frames[pose.image] for pose in poses], dtype=np.int64)
         Ts_camera_object = np.array([pose.T_camera_object for pose in poses])
         Ts_world_box = frames.Ts_world_camera[rows] @ Ts_camera_object @ model.T_object_box
-        placed = resting_objects(rows, Ts_world_box, size=model.size, rotations=model.rotations, axis=model.axis)
+        placed = resting_objects(rows, Ts_world_box, size=model.size, symmetry=model.symmetry)
         for place in placed:
             own = [poses[row] for row in place.rows.tolist()]
             if place.problem is not None:
                 left_out.extend(LeftOut(place.problem, pose.where) for pose in own)
                 continue
             wheres = {matching.frames[pose.image]: pose.where for pose in own}
-            objects.append(PlannedObject(class_name, Box(place.T_world_box, model.size), wheres=wheres))
+            box = Box(place.T_world_box, model.size)
+            objects.append(PlannedObject(class_name, box, symmetry=model.symmetry, wheres=wheres))
     return objects, left_out
 
 

@@ -68,7 +68,8 @@ def matched_images(labels: ForeignLabels, frames: FrameTable, cameras: Mapping[i
         )
     taken = Counter(found.values())
     exact = {place for place in named if place in found and frames.names[found[place]] == labels.images[place].name}
-    certain = {place: frame for place, frame in found.items() if taken[frame] == 1 or place in exact}
+    once = Counter(found[place] for place in exact)
+    certain = {p: frame for p, frame in found.items() if taken[frame] == 1 or (p in exact and once[frame] == 1)}
     problems = {
         place: TWO_IMAGES if place in found else NO_FRAME for place in range(len(labels.images)) if place not in certain
     }

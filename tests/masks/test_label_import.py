@@ -15,6 +15,7 @@ from ars_web.errors import BadFile, BadInput
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box, iou
 from ars_web.geometry.labels import labels_of_boxes, outline
+from ars_web.geometry.symmetry import Symmetry
 from ars_web.masks.label_import import MOST_VIEWS, ImportedLabels, LabelImport
 from ars_web.recordings.registry import read_recording
 from ars_web.sessions.editing import SessionEditor
@@ -107,6 +108,9 @@ def test_a_bop_scene_becomes_boxes_where_they_are(
     assert (made.boxes, made.masks, made.left_out) == (3, 0, ())
     assert made.new_classes == ("obj_000001", "obj_000007")
     state = store.state(sid)
+    z = (0.0, 0.0, 1.0)
+    assert state.classes[1].symmetry == Symmetry("discrete", ((z, 2),))
+    assert state.classes[2].symmetry == Symmetry("continuous", axis=z)
     assert [(box.name, box.class_id) for box in state.boxes.values()] == [
         ("obj_000001", 1),
         ("obj_000001 2", 1),
@@ -118,6 +122,44 @@ def test_a_bop_scene_becomes_boxes_where_they_are(
     assert (edit.summary, edit.author) == ("Import labels (bop) of 3 objects", "ana")
     SessionEditor(store).undo(sid, author="ana")
     assert (store.state(sid).boxes, list(store.state(sid).classes)) == ({}, [0])
+
+
+def test_a_bop_dataset_of_this_program_says_what_its_images_and_objects_are(
+    bop_scene: ModuleType, ring_scene: ModuleType, store: SessionStore, sid: str, take, tmp_path: Path
+) -> None:
+    """Images are numbered anew in it, a model need not fill its box, and two sizes of a class are two models."""
+    scene = bop_scene.write(ring_scene, tmp_path / "bop", frames=12, images=False, models=bop_scene.CENTRED)
+    objects: dict[str, Any] = {}
+    for obj_id in ("1", "7"):
+        model = bop_scene.CENTRED[obj_id]
+        size = [model["size_x"] + 2, model["size_y"] + 2, model["size_z"] + 2]
+        objects[obj_id] = {"class": "cup", "shape": "hull", "size_mm": size, "boxes": []}
+    (tmp_path / "bop" / "objects.json").write_text(json.dumps(objects))
+    # Backwards: image i is frame 11 - i.
+    (tmp_path / "bop" / "frames.txt").write_text("".join(f"{i:06d} ring!{11 - i:05d}.jpg\n" for i in range(12)))
+    for name in ("scene_gt.json", "scene_camera.json"):
+        content = json.loads((scene / name).read_text())
+        val = tmp_path / "bop" / "val" / "000001"
+        val.mkdir(parents=True, exist_ok=True)
+        turned = {str(11 - int(i)): one for i, one in content.items()}
+        (scene / name).write_text(json.dumps({i: one for i, one in turned.items() if int(i) >= 4}))
+        (val / name).write_text(json.dumps({i: one for i, one in turned.items() if int(i) < 4}))
+    made = take(tmp_path / "bop")
+    assert (made.boxes, made.left_out, made.new_classes) == (3, (), ())
+    first = store.state(sid).boxes[1]
+    assert (first.class_id, first.name) == (0, "cup")
+    np.testing.assert_allclose(first.box.size, [0.062, 0.042, 0.082])
+    np.testing.assert_allclose(first.box.T_world_box[:3, 2:], bop_scene.OBJECTS[0][1].T_world_box[:3, 2:], atol=1e-9)
+
+
+def test_a_class_that_is_there_keeps_its_symmetry(
+    bop_scene: ModuleType, ring_scene: ModuleType, store: SessionStore, sid: str, take, tmp_path: Path
+) -> None:
+    SessionEditor(store).add_class(sid, name="obj_000007", author="ana")
+    made = take(bop_scene.write(ring_scene, tmp_path / "bop", images=False))
+    assert made.new_classes == ("obj_000001",)
+    assert store.state(sid).classes[1].symmetry.kind == "none"
+    assert made.notes[1:] == ("The class obj_000007 keeps the symmetry that it has; the file says another.",)
 
 
 def test_poses_that_are_a_little_off_give_the_middle(
