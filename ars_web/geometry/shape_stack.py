@@ -1,0 +1,101 @@
+"""Boxes and meshes of one scene as the compiled loops read them: all of them triangles, one after the other."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from ars_web.errors import BadInput
+from ars_web.geometry import rigid_transform
+from ars_web.geometry.box import Box
+from ars_web.geometry.mesh import Mesh
+from ars_web.geometry.occlusion import beyond_faces
+from ars_web.geometry.raster_kernels import Shapes
+
+BOX_FACES: Int[np.ndarray, "12 3"] = np.array(
+    [
+        triangle
+        for a, b, c, d in ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+        for triangle in ((a, b, c), (a, c, d))
+    ]
+)
+"""Of a box's corners in the order of box.CORNER_SIGNS, counter-clockwise as seen from outside."""
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeStack:
+    """b shapes.
+
+    Attributes:
+        vertices: (v, 3) in the world, of all shapes.
+        faces: (f, 3) vertices of all triangles, counter-clockwise as seen from outside.
+        planes: (f, 4) as `Mesh.planes`.
+        first_vertex, first_face: (b + 1,) where each shape's begin; the last is where they end.
+        Ts_world_bound, halves: (b, 4, 4) and (b, 3) the boxes, along the axes of `boxes`, round the shapes.
+        beyond: (b, b) as `occlusion.beyond_faces`, of those.
+    """
+
+    vertices: Float[np.ndarray, "v 3"]
+    faces: Int[np.ndarray, "f 3"]
+    planes: Float[np.ndarray, "f 4"]
+    first_vertex: Int[np.ndarray, "b+1"]
+    first_face: Int[np.ndarray, "b+1"]
+    Ts_world_bound: Float[np.ndarray, "b 4 4"]
+    halves: Float[np.ndarray, "b 3"]
+    beyond: Int[np.ndarray, "b b"]
+
+
+def mesh_of_box(box: Box) -> Mesh:
+    """The box's surface, as twelve triangles."""
+    return Mesh(box.corners_world, BOX_FACES)
+
+
+def stack_shapes(boxes: Sequence[Box], meshes: Sequence[Mesh | None]) -> ShapeStack:
+    """The shapes, of which each is its mesh, or its box where that is None; kept for the next call with the same ones.
+
+    Raises:
+        BadInput: there are not as many meshes as boxes.
+    """
+    if len(boxes) != len(meshes):
+        raise BadInput(f"each shape needs a box, and a mesh or None: {len(boxes)} boxes and {len(meshes)} meshes")
+    return _stack(tuple(boxes), tuple(meshes))
+
+
+@lru_cache(maxsize=4)
+def _stack(boxes: tuple[Box, ...], meshes: tuple[Mesh | None, ...]) -> ShapeStack:
+    solids = [mesh_of_box(box) if mesh is None else mesh for box, mesh in zip(boxes, meshes, strict=True)]
+    first_vertex = np.cumsum([0, *(len(solid.vertices_world) for solid in solids)])
+    first_face = np.cumsum([0, *(len(solid.faces) for solid in solids)])
+    faces = [solid.faces + first for solid, first in zip(solids, first_vertex[:-1].tolist(), strict=True)]
+    Ts_world_bound, halves = np.empty((len(boxes), 4, 4)), np.empty((len(boxes), 3))
+    for i, (box, solid) in enumerate(zip(boxes, solids, strict=True)):
+        inside = rigid_transform.transform_points(rigid_transform.invert(box.T_world_box), solid.vertices_world)
+        low, high = inside.min(axis=0), inside.max(axis=0)
+        halves[i] = (high - low) / 2
+        Ts_world_bound[i] = box.T_world_box
+        Ts_world_bound[i, :3, 3] += box.T_world_box[:3, :3] @ ((low + high) / 2)
+    return ShapeStack(
+        np.concatenate([np.zeros((0, 3)), *(solid.vertices_world for solid in solids)]),
+        np.concatenate([np.zeros((0, 3), np.int64), *faces]),
+        np.concatenate([np.zeros((0, 4)), *(solid.planes for solid in solids)]),
+        first_vertex,
+        first_face,
+        Ts_world_bound,
+        halves,
+        beyond_faces(Ts_world_bound, 2 * halves),
+    )
+
+
+def kernel_shapes(stack: ShapeStack) -> Shapes:
+    """The stack for one thread: copies, because threads that count the users of one array stand in each other's way."""
+    return Shapes(
+        stack.vertices.copy(),
+        stack.faces.copy(),
+        stack.planes.copy(),
+        stack.first_vertex.copy(),
+        stack.first_face.copy(),
+        stack.Ts_world_bound.copy(),
+        stack.halves.copy(),
+    )
