@@ -5,8 +5,8 @@ signs of (a x b) . d, (b x c) . d and (c x a) . d tell, and meets the triangle's
 their sum over a . (b x c): all linear in x and y, whatever of the triangle is behind the camera (Olano and Greer,
 Triangle Scan Conversion using 2D Homogeneous Coordinates, 1997). A lens changes only which rays there are.
 
-A grid's rays lie nearly evenly on the normalised plane. Its `fit` says which column and row of an even grid a point
-of that plane is in, and by how much the grid's own rays are off that: so a triangle need only be tried with few.
+Which rays those are is told by the images of the corners: the image of a side is off its chord by an eighth of the
+lens's bend times the side's length squared, at most.
 """
 
 import math
@@ -15,11 +15,22 @@ from typing import NamedTuple
 import numpy as np
 
 from ars_web.geometry.compiled import entry, part
+from ars_web.geometry.lens_kernels import Lens
 
 Array = np.ndarray
 
 AHEAD = 1e-9
 """Metres of depth, from which on x / z and y / z are used."""
+
+MARGIN = 1.1
+"""Times the largest radius that the image has on the normalised plane: up to there corners are said to have an image.
+Beyond, the lens may bend too much for the image of a corner to tell anything."""
+
+SLACK = 0.05
+"""Pixels that rays may be off their image points, because they are taken between others, and corners' images."""
+
+FEW = 3
+"""Columns of a triangle's box, up to which every ray in it is tried."""
 
 NEARER = 1.0 + 1e-9
 """Times the other's inverse depth: surfaces that lie in each other do not hide each other."""
@@ -29,11 +40,19 @@ OUTSIDE, ROUND, CUT = 0, 1, 2
 
 
 class Shapes(NamedTuple):
-    """`shape_stack.ShapeStack` as the kernels read it."""
+    """`shape_stack.ShapeStack` as the kernels read it.
+
+    Attributes:
+        vertices: (3, v).
+        faces: (3, f).
+        planes: (4, f).
+        sides: (f,) the square of each face's longest side.
+    """
 
     vertices: Array
     faces: Array
     planes: Array
+    sides: Array
     first_vertex: Array
     first_face: Array
     Ts_world_bound: Array
@@ -44,41 +63,58 @@ class Placed(NamedTuple):
     """The shapes of one frame, as its camera sees them; overwritten frame by frame.
 
     Attributes:
-        X, Y, Z: (v,) camera coordinates of the vertices.
-        x, y: (v,) X / Z and Y / Z, used where Z > AHEAD.
+        points: (3, v) camera coordinates of the vertices.
+        image: (2, v) their image coordinates; the first is NaN where they have none.
+        nearness: (v,) the square of their inverse depth.
         listed: (f,) the faces to draw, from `first_face` on for each shape.
-        counts: (b,) how many those are.
+        reach: (5, f) the least and largest u, and the least and largest v, of those faces, in the order of `listed`,
+            infinite where a corner has no image; and by how much they may be off the triangles of the corners' images.
+        counts: (b,) how many faces are listed.
         kinds: (b,) OUTSIDE, ROUND or CUT.
-        columns, rows: (v,) room for the vertices' places on a grid.
     """
 
-    X: Array
-    Y: Array
-    Z: Array
-    x: Array
-    y: Array
+    points: Array
+    image: Array
+    nearness: Array
     listed: Array
+    reach: Array
     counts: Array
     kinds: Array
-    columns: Array
-    rows: Array
+
+
+class Frustum(NamedTuple):
+    """What of the normalised plane an image shows: the largest radius, the least and largest x, and y."""
+
+    radius: float
+    low_x: float
+    high_x: float
+    low_y: float
+    high_y: float
+
+
+class Grid(NamedTuple):
+    """Rays row by row, at the image points (u + j du, v + i dv)."""
+
+    u: float
+    v: float
+    du: float
+    dv: float
+    rows: int
+    columns: int
 
 
 @part
 def room(shapes: Shapes) -> Placed:
     """Room for the shapes of a frame."""
-    v, f, b = len(shapes.vertices), len(shapes.faces), len(shapes.halves)
+    v, f, b = shapes.vertices.shape[1], shapes.faces.shape[1], len(shapes.halves)
     return Placed(
-        np.empty(v),
-        np.empty(v),
-        np.empty(v),
-        np.empty(v),
+        np.empty((3, v)),
+        np.empty((2, v)),
         np.empty(v),
         np.empty(f, np.int64),
+        np.empty((5, f)),
         np.zeros(b, np.int64),
         np.zeros(b, np.int64),
-        np.empty(v),
-        np.empty(v),
     )
 
 
@@ -109,95 +145,135 @@ def surrounds(T_world_camera: Array, shapes: Shapes, b: int) -> bool:
     px, py, pz = T_world_camera[0, 3], T_world_camera[1, 3], T_world_camera[2, 3]
     angle = 0.0
     for f in range(shapes.first_face[b], shapes.first_face[b + 1]):
-        i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
-        ax, ay, az = vertices[i, 0] - px, vertices[i, 1] - py, vertices[i, 2] - pz
-        bx, by, bz = vertices[j, 0] - px, vertices[j, 1] - py, vertices[j, 2] - pz
-        cx, cy, cz = vertices[k, 0] - px, vertices[k, 1] - py, vertices[k, 2] - pz
+        i, j, k = faces[0, f], faces[1, f], faces[2, f]
+        ax, ay, az = vertices[0, i] - px, vertices[1, i] - py, vertices[2, i] - pz
+        bx, by, bz = vertices[0, j] - px, vertices[1, j] - py, vertices[2, j] - pz
+        cx, cy, cz = vertices[0, k] - px, vertices[1, k] - py, vertices[2, k] - pz
         a = math.sqrt(ax * ax + ay * ay + az * az)
         b_ = math.sqrt(bx * bx + by * by + bz * bz)
         c = math.sqrt(cx * cx + cy * cy + cz * cz)
         volume = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
         below = a * b_ * c
-        below += (ax * bx + ay * by + az * bz) * c + (bx * cx + by * cy + bz * cz) * a + (cx * ax + cy * ay + cz * az) * b_
+        below += (ax * bx + ay * by + az * bz) * c + (bx * cx + by * cy + bz * cz) * a
+        below += (cx * ax + cy * ay + cz * az) * b_
         angle += math.atan2(volume, below)
     return abs(angle) > math.pi
 
 
 @part
-def place_shape(T_world_camera: Array, shapes: Shapes, b: int, near: float, within: bool, placed: Placed) -> None:
-    """One shape's vertices in camera coordinates, and which of its faces to draw; `within`: whether the camera is in
-    its bound."""
+def place_vertices(
+    T_world_camera: Array, lens: Lens, limit: float, vertices: Array, start: int, end: int, placed: Placed
+) -> None:
+    """The vertices from `start` to `end` in camera coordinates and in the image (camera.pixels_from_normalised); they
+    have an image up to a radius whose square is `limit`."""
+    points, image, nearness = placed.points, placed.image, placed.nearness
     r00, r01, r02 = T_world_camera[0, 0], T_world_camera[1, 0], T_world_camera[2, 0]
     r10, r11, r12 = T_world_camera[0, 1], T_world_camera[1, 1], T_world_camera[2, 1]
     r20, r21, r22 = T_world_camera[0, 2], T_world_camera[1, 2], T_world_camera[2, 2]
     px, py, pz = T_world_camera[0, 3], T_world_camera[1, 3], T_world_camera[2, 3]
-    vertices, nearest = shapes.vertices, np.inf
-    for i in range(shapes.first_vertex[b], shapes.first_vertex[b + 1]):
-        vx, vy, vz = vertices[i, 0] - px, vertices[i, 1] - py, vertices[i, 2] - pz
-        X = r00 * vx + r01 * vy + r02 * vz
-        Y = r10 * vx + r11 * vy + r12 * vz
-        Z = r20 * vx + r21 * vy + r22 * vz
-        inverse = 1.0 / max(Z, AHEAD)
-        placed.X[i], placed.Y[i], placed.Z[i] = X, Y, Z
-        placed.x[i], placed.y[i] = X * inverse, Y * inverse
-        nearest = min(nearest, Z)
-    kind = OUTSIDE if nearest >= near else CUT
-    if within and surrounds(T_world_camera, shapes, b):
-        kind = ROUND
-    first, n = shapes.first_face[b], 0
-    if kind == OUTSIDE:
-        # Only what faces the camera: a closed surface is first met from outside.
-        planes = shapes.planes
-        for f in range(first, shapes.first_face[b + 1]):
-            placed.listed[first + n] = f
-            n += planes[f, 0] * px + planes[f, 1] * py + planes[f, 2] * pz + planes[f, 3] > 0.0
+    # Short loops that each do one thing: the processor takes several vertices at a time.
+    for i in range(start, end):
+        x, y, z = vertices[0, i] - px, vertices[1, i] - py, vertices[2, i] - pz
+        points[0, i] = r00 * x + r01 * y + r02 * z
+        points[1, i] = r10 * x + r11 * y + r12 * z
+        points[2, i] = r20 * x + r21 * y + r22 * z
+    k1, k2, k3, k4, p1, p2 = lens.k1, lens.k2, lens.k3, lens.k4, lens.p1, lens.p2
+    fx, fy, cx, cy = lens.fx, lens.fy, lens.cx, lens.cy
+    if lens.fisheye:
+        for i in range(start, end):
+            inverse = 1.0 / max(points[2, i], AHEAD)
+            x, y = points[0, i] * inverse, points[1, i] * inverse
+            r2 = x * x + y * y
+            r = math.sqrt(r2)
+            angle = math.atan(r)
+            t2 = angle * angle
+            scale = angle * (1.0 + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4)))) / r if r > 1e-12 else 1.0
+            seen = (points[2, i] > AHEAD) & (r2 < limit)
+            image[0, i] = fx * x * scale + cx if seen else np.nan
+            image[1, i] = fy * y * scale + cy
+            nearness[i] = inverse * inverse
     else:
-        for f in range(first, shapes.first_face[b + 1]):
-            placed.listed[f] = f
-        n = shapes.first_face[b + 1] - first
-    placed.counts[b], placed.kinds[b] = n, kind
+        for i in range(start, end):
+            inverse = 1.0 / max(points[2, i], AHEAD)
+            x, y = points[0, i] * inverse, points[1, i] * inverse
+            r2 = x * x + y * y
+            radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+            seen = (points[2, i] > AHEAD) & (r2 < limit)
+            u = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
+            image[0, i] = fx * u + cx if seen else np.nan
+            image[1, i] = fy * (y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y) + cy
+            nearness[i] = inverse * inverse
 
 
 @part
-def fit_grid(xs: Array, ys: Array, rows: int, columns: int, fit: Array) -> None:
-    """How a grid of rays, row by row in `xs` and `ys`, lies on the normalised plane, written to `fit` (12,): a point's
-    column fit[0] + fit[1] x + fit[2] y, its row likewise from 3 on, by how much rays are off their column and row,
-    and the least and largest x and y."""
-    row, column = rows // 2, columns // 2
-    start, end = row * columns, row * columns + columns - 1
-    over, under = column, (rows - 1) * columns + column
-    ax, ay = (xs[end] - xs[start]) / max(columns - 1, 1), (ys[end] - ys[start]) / max(columns - 1, 1)
-    bx, by = (xs[under] - xs[over]) / max(rows - 1, 1), (ys[under] - ys[over]) / max(rows - 1, 1)
-    if columns == 1 and rows == 1:
-        ax, by = 1.0, 1.0
-    elif columns == 1:
-        ax, ay = by, -bx
-    elif rows == 1:
-        bx, by = -ay, ax
-    over_det = 1.0 / (ax * by - ay * bx)
-    middle = row * columns + column
-    x0, y0 = xs[middle], ys[middle]
-    c1, c2, r1, r2 = by * over_det, -bx * over_det, -ay * over_det, ax * over_det
-    c0, r0 = column - c1 * x0 - c2 * y0, row - r1 * x0 - r2 * y0
-    off_column, off_row = 0.0, 0.0
-    low_x, high_x, low_y, high_y = np.inf, -np.inf, np.inf, -np.inf
-    for i in range(rows):
-        for j in range(columns):
-            x, y = xs[i * columns + j], ys[i * columns + j]
-            # Beyond the lens's rim rays are NaN, and every comparison with them is false.
-            off_c, off_r = abs(c0 + c1 * x + c2 * y - j), abs(r0 + r1 * x + r2 * y - i)
-            off_column = off_c if off_c > off_column else off_column
-            off_row = off_r if off_r > off_row else off_row
-            low_x = x if x < low_x else low_x
-            high_x = x if x > high_x else high_x
-            low_y = y if y < low_y else low_y
-            high_y = y if y > high_y else high_y
-    if not math.isfinite(c0 + c1 + c2 + r0 + r1 + r2):
-        c0, c1, c2, r0, r1, r2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        off_column, off_row = np.inf, np.inf
-    fit[0], fit[1], fit[2], fit[3], fit[4], fit[5] = c0, c1, c2, r0, r1, r2
-    fit[6], fit[7] = off_column + 1e-6, off_row + 1e-6
-    fit[8], fit[9], fit[10], fit[11] = low_x, high_x, low_y, high_y
+def place_faces(
+    faces: Array, sides: Array, bend: float, first: int, end: int, placed: Placed
+) -> None:
+    """Where in the image the listed faces from `first` to `end` may be met; `bend`: pixels by which the image of a side
+    is off its chord, for the square of its length a metre before the camera."""
+    image, nearness, listed, reach = placed.image, placed.nearness, placed.listed, placed.reach
+    for k in range(first, end):
+        f = listed[k]
+        a, b, c = faces[0, f], faces[1, f], faces[2, f]
+        off = bend * sides[f] * max(nearness[a], max(nearness[b], nearness[c])) + SLACK
+        ua, ub, uc, va, vb, vc = image[0, a], image[0, b], image[0, c], image[1, a], image[1, b], image[1, c]
+        known = ua + ub + uc == ua + ub + uc
+        reach[0, k] = min(ua, min(ub, uc)) - off if known else -np.inf
+        reach[1, k] = max(ua, max(ub, uc)) + off if known else np.inf
+        reach[2, k] = min(va, min(vb, vc)) - off if known else -np.inf
+        reach[3, k] = max(va, max(vb, vc)) + off if known else np.inf
+        reach[4, k] = off
+
+
+@part
+def place_shape(
+    T_world_camera: Array, lens: Lens, bend: float, frustum: Frustum, shapes: Shapes, b: int, near: float, within: bool, placed: Placed
+) -> None:
+    """One shape as the camera sees it; `bend`: bound on the second derivative of a straight line's image, pixels, where
+    corners have an image; `within`: whether the camera is in the shape's bound."""
+    start, end = shapes.first_vertex[b], shapes.first_vertex[b + 1]
+    limit = (MARGIN * frustum.radius) ** 2
+    place_vertices(T_world_camera, lens, limit, shapes.vertices, start, end, placed)
+    nearest = np.inf
+    for i in range(start, end):
+        nearest = placed.points[2, i] if placed.points[2, i] < nearest else nearest
+    kind = OUTSIDE if nearest >= near else CUT
+    if within and surrounds(T_world_camera, shapes, b):
+        kind = ROUND
+    first, listed, planes = shapes.first_face[b], placed.listed, shapes.planes
+    n = first
+    if kind == OUTSIDE:
+        # Only what faces the camera: a closed surface is first met from outside.
+        px, py, pz = T_world_camera[0, 3], T_world_camera[1, 3], T_world_camera[2, 3]
+        for f in range(first, shapes.first_face[b + 1]):
+            listed[n] = f
+            n += 1 if planes[0, f] * px + planes[1, f] * py + planes[2, f] * pz + planes[3, f] > 0.0 else 0
+    else:
+        n = shapes.first_face[b + 1]
+        for f in range(first, n):
+            listed[f] = f
+    # On the normalised plane a side is as long as in space times sqrt(1 + r^2) / z, at most.
+    place_faces(shapes.faces, shapes.sides, 0.125 * bend * (1.0 + limit), first, n, placed)
+    placed.counts[b], placed.kinds[b] = n - first, kind
+
+
+@part
+def trim(image: Array, i: int, j: int, m: int, off: float, grid: Grid, bounds: Array) -> None:
+    """Between which columns of a row may be what is `off` pixels at most from the triangle of three vertices' images:
+    for each of its sides from bounds[0] + bounds[1] row to bounds[2] + bounds[3] row."""
+    ui, uj, um, vi, vj, vm = image[0, i], image[0, j], image[0, m], image[1, i], image[1, j], image[1, m]
+    turned = 1.0 if (uj - ui) * (vm - vi) >= (vj - vi) * (um - ui) else -1.0
+    for s in range(3):
+        # The points (u, v) on the triangle's side of one of its sides: a u + b v + c >= 0.
+        a, b = turned * (vi - vj), turned * (uj - ui)
+        c = (abs(a) + abs(b)) * off - a * ui - b * vi
+        slope, place = -b * grid.dv / (a * grid.du), -(c + b * grid.v + a * grid.u) / (a * grid.du)
+        bounds[s, 0], bounds[s, 1], bounds[s, 2], bounds[s, 3] = -np.inf, 0.0, np.inf, 0.0
+        if a > 0.0:
+            bounds[s, 0], bounds[s, 1] = place, slope
+        elif a < 0.0:
+            bounds[s, 2], bounds[s, 3] = place, slope
+        ui, uj, um, vi, vj, vm = uj, um, ui, vj, vm, vi
 
 
 @part
@@ -207,63 +283,71 @@ def draw(
     b: int,
     side: float,
     near: float,
+    frustum: Frustum,
+    grid: Grid,
     xs: Array,
     ys: Array,
-    rows: int,
-    columns: int,
-    fit: Array,
     drawn: Array,
 ) -> None:
     """Raise the inverse depths `drawn` of a grid's rays to those at which they meet a shape's listed faces beyond the
     near plane: from outside where `side` is 1, from inside where it is -1, either where it is 0."""
-    X, Y, Z, x, y, faces = placed.X, placed.Y, placed.Z, placed.x, placed.y, shapes.faces
-    at_column, at_row = placed.columns, placed.rows
-    c0, c1, c2, r0, r1, r2 = fit[0], fit[1], fit[2], fit[3], fit[4], fit[5]
-    for i in range(shapes.first_vertex[b], shapes.first_vertex[b + 1]):
-        at_column[i] = c0 + c1 * x[i] + c2 * y[i]
-        at_row[i] = r0 + r1 * x[i] + r2 * y[i]
-    off_column, off_row, low_x, high_x, low_y, high_y = fit[6], fit[7], fit[8], fit[9], fit[10], fit[11]
-    last_row, last_column, furthest = rows - 1.0, columns - 1.0, 1.0 / near
-    ahead = placed.kinds[b] == OUTSIDE
+    P, image, faces, reach = placed.points, placed.image, shapes.faces, placed.reach
+    bounds = np.empty((3, 4))
+    furthest, rows, columns = 1.0 / near, grid.rows, grid.columns
+    u, v, by_du, by_dv = grid.u, grid.v, 1.0 / grid.du, 1.0 / grid.dv
+    last_row, last_column = rows - 1.0, columns - 1.0
+    low_x, high_x, low_y, high_y = frustum.low_x, frustum.high_x, frustum.low_y, frustum.high_y
     first = shapes.first_face[b]
     for k in range(first, first + placed.counts[b]):
+        first_column = math.ceil(max((reach[0, k] - u) * by_du, 0.0))
+        end_column = math.floor(min((reach[1, k] - u) * by_du, last_column)) + 1
+        first_row = math.ceil(max((reach[2, k] - v) * by_dv, 0.0))
+        end_row = math.floor(min((reach[3, k] - v) * by_dv, last_row)) + 1
+        if first_row >= end_row or first_column >= end_column:
+            continue
         f = placed.listed[k]
-        i, j, m = faces[f, 0], faces[f, 1], faces[f, 2]
-        if ahead or (Z[i] > AHEAD and Z[j] > AHEAD and Z[m] > AHEAD):
-            low = max(min(at_row[i], min(at_row[j], at_row[m])) - off_row, 0.0)
-            high = min(max(at_row[i], max(at_row[j], at_row[m])) + off_row, last_row)
-            first_row, end_row = math.ceil(low), math.floor(high) + 1
-            low = max(min(at_column[i], min(at_column[j], at_column[m])) - off_column, 0.0)
-            high = min(max(at_column[i], max(at_column[j], at_column[m])) + off_column, last_column)
-            first_column, end_column = math.ceil(low), math.floor(high) + 1
-            if first_row >= end_row or first_column >= end_column:
-                continue
-        else:
+        i, j, m = faces[0, f], faces[1, f], faces[2, f]
+        xi, yi, zi = P[0, i], P[1, i], P[2, i]
+        xj, yj, zj = P[0, j], P[1, j], P[2, j]
+        xm, ym, zm = P[0, m], P[1, m], P[2, m]
+        if reach[1, k] == np.inf:
             if (
-                max(Z[i], max(Z[j], Z[m])) < near
-                or min(X[i] - high_x * Z[i], min(X[j] - high_x * Z[j], X[m] - high_x * Z[m])) > 0.0
-                or max(X[i] - low_x * Z[i], max(X[j] - low_x * Z[j], X[m] - low_x * Z[m])) < 0.0
-                or min(Y[i] - high_y * Z[i], min(Y[j] - high_y * Z[j], Y[m] - high_y * Z[m])) > 0.0
-                or max(Y[i] - low_y * Z[i], max(Y[j] - low_y * Z[j], Y[m] - low_y * Z[m])) < 0.0
+                max(zi, max(zj, zm)) < near
+                or min(xi - high_x * zi, min(xj - high_x * zj, xm - high_x * zm)) > 0.0
+                or max(xi - low_x * zi, max(xj - low_x * zj, xm - low_x * zm)) < 0.0
+                or min(yi - high_y * zi, min(yj - high_y * zj, ym - high_y * zm)) > 0.0
+                or max(yi - low_y * zi, max(yj - low_y * zj, ym - low_y * zm)) < 0.0
             ):
                 continue
-            first_row, end_row, first_column, end_column = 0, rows, 0, columns
         # Of two triangles with a side in common each ray beside it is in one: what is told of the side by one is what
         # is told by the other with the sign turned, to the last bit.
-        ax, ay, az = Y[i] * Z[j] - Z[i] * Y[j], Z[i] * X[j] - X[i] * Z[j], X[i] * Y[j] - Y[i] * X[j]
-        bx, by, bz = Y[j] * Z[m] - Z[j] * Y[m], Z[j] * X[m] - X[j] * Z[m], X[j] * Y[m] - Y[j] * X[m]
-        cx, cy, cz = Y[m] * Z[i] - Z[m] * Y[i], Z[m] * X[i] - X[m] * Z[i], X[m] * Y[i] - Y[m] * X[i]
-        volume = X[i] * bx + Y[i] * by + Z[i] * bz
+        ax, ay, az = yi * zj - zi * yj, zi * xj - xi * zj, xi * yj - yi * xj
+        bx, by, bz = yj * zm - zj * ym, zj * xm - xj * zm, xj * ym - yj * xm
+        cx, cy, cz = ym * zi - zm * yi, zm * xi - xm * zi, xm * yi - ym * xi
+        volume = xi * bx + yi * by + zi * bz
         if volume * side > 0.0 or volume == 0.0:
             continue
         if volume < 0.0:
             ax, ay, az, bx, by, bz, cx, cy, cz = -ax, -ay, -az, -bx, -by, -bz, -cx, -cy, -cz
             volume = -volume
         scale = 1.0 / volume
+        # A long thin triangle fills little of its box: within it, each side bounds the columns of a row.
+        narrow = end_column - first_column > FEW and end_row > first_row + 1 and reach[1, k] != np.inf
+        if narrow:
+            trim(image, i, j, m, reach[4, k], grid, bounds)
         for row in range(first_row, end_row):
-            for ray in range(row * columns + first_column, row * columns + end_column):
-                rx, ry = xs[ray], ys[ray]
-                past_a, past_b, past_c = ax * rx + ay * ry + az, bx * rx + by * ry + bz, cx * rx + cy * ry + cz
+            start, end = row * columns + first_column, row * columns + end_column
+            if narrow:
+                low, high = float(first_column), end_column - 1.0
+                for s in range(3):
+                    low = max(low, bounds[s, 0] + bounds[s, 1] * row)
+                    high = min(high, bounds[s, 2] + bounds[s, 3] * row)
+                if low > high:
+                    continue
+                start, end = row * columns + math.ceil(low), row * columns + math.floor(high) + 1
+            for ray in range(start, end):
+                x, y = xs[ray], ys[ray]
+                past_a, past_b, past_c = ax * x + ay * y + az, bx * x + by * y + bz, cx * x + cy * y + cz
                 met = (past_a + past_b + past_c) * scale
                 hit = (past_a >= 0.0) & (past_b >= 0.0) & (past_c >= 0.0) & (met <= furthest) & (met > drawn[ray])
                 drawn[ray] = met if hit else drawn[ray]
@@ -275,27 +359,24 @@ def draw_shape(
     placed: Placed,
     b: int,
     near: float,
+    frustum: Frustum,
+    grid: Grid,
     xs: Array,
     ys: Array,
-    rows: int,
-    columns: int,
-    fit: Array,
     drawn: Array,
-    spare: Array,
 ) -> None:
     """Raise the inverse depths `drawn` of a grid's rays to those at which they meet a shape, as box labels have it: it
-    is cut off at the near plane, and closed there; from within it, its far side is met. `spare` (2, n) is written."""
+    is cut off at the near plane, and closed there; from within it, its far side is met."""
     kind = placed.kinds[b]
     if kind == OUTSIDE:
-        draw(shapes, placed, b, 1.0, near, xs, ys, rows, columns, fit, drawn)
+        draw(shapes, placed, b, 1.0, near, frustum, grid, xs, ys, drawn)
     elif kind == ROUND:
-        draw(shapes, placed, b, 0.0, near, xs, ys, rows, columns, fit, drawn)
+        draw(shapes, placed, b, 0.0, near, frustum, grid, xs, ys, drawn)
     else:
-        n = rows * columns
-        front, back = spare[0], spare[1]
-        front[:n], back[:n] = 0.0, 0.0
-        draw(shapes, placed, b, 1.0, near, xs, ys, rows, columns, fit, front)
-        draw(shapes, placed, b, -1.0, near, xs, ys, rows, columns, fit, back)
+        n = grid.rows * grid.columns
+        front, back = np.zeros(n), np.zeros(n)
+        draw(shapes, placed, b, 1.0, near, frustum, grid, xs, ys, front)
+        draw(shapes, placed, b, -1.0, near, frustum, grid, xs, ys, back)
         for ray in range(n):
             # What is left before it is entered was entered nearer than the near plane.
             met = front[ray] if back[ray] <= front[ray] * NEARER else 1.0 / near
@@ -335,12 +416,63 @@ def cast_grid(
             ys[i * columns + j] = line_y[k] + right * (line_y[k + 1] - line_y[k])
 
 
+@part
+def copy_rays(lattice: Array, row: int, column: int, rows: int, columns: int, xs: Array, ys: Array) -> None:
+    """A part of a lattice (2, h, w), row by row, written to `xs` and `ys`."""
+    for i in range(rows):
+        for j in range(columns):
+            xs[i * columns + j] = lattice[0, row + i, column + j]
+            ys[i * columns + j] = lattice[1, row + i, column + j]
+
+
+@part
+def crops_of(bbox: Array, step: float, height: int, width: int, crops: Array) -> None:
+    """The parts of the lattice, a ray in the middle of every `step` x `step` pixels, that boxes (b, 4) hold, written to
+    `crops` (b, 4): first row, first column, rows, columns; none where a box is NaN."""
+    for b in range(len(bbox)):
+        if math.isnan(bbox[b, 0]):
+            crops[b] = 0
+            continue
+        column = max(math.ceil(bbox[b, 0] / step - 0.5), 0)
+        row = max(math.ceil(bbox[b, 1] / step - 0.5), 0)
+        crops[b, 0], crops[b, 1] = row, column
+        crops[b, 2] = max(min(math.floor(bbox[b, 3] / step - 0.5) + 1, height) - row, 0)
+        crops[b, 3] = max(min(math.floor(bbox[b, 2] / step - 0.5) + 1, width) - column, 0)
+
+
+@part
+def hide(seen: Array, crop: Array, other: Array, crop_of_other: Array, hidden: Array) -> None:
+    """Mark those of a shape's rays, on its part of the lattice, that another meets first."""
+    row, column = max(crop[0], crop_of_other[0]), max(crop[1], crop_of_other[1])
+    end_row = min(crop[0] + crop[2], crop_of_other[0] + crop_of_other[2])
+    columns = min(crop[1] + crop[3], crop_of_other[1] + crop_of_other[3]) - column
+    for i in range(row, end_row):
+        here = (i - crop[0]) * crop[3] + column - crop[1]
+        there = (i - crop_of_other[0]) * crop_of_other[3] + column - crop_of_other[1]
+        for j in range(columns):
+            hidden[here + j] |= other[there + j] > seen[here + j] * NEARER
+
+
+@part
+def share_left(seen: Array, hidden: Array, n: int) -> float:
+    """The share that is not hidden of the rays that meet a shape; NaN where none does."""
+    met, left = 0, 0
+    for ray in range(n):
+        met += 1 if seen[ray] > 0.0 else 0
+        left += 1 if (seen[ray] > 0.0) & (not hidden[ray]) else 0
+    return left / met if met > 0 else np.nan
+
+
 @entry
 def visible_shares(
     Ts_world_camera: Array,
+    lens: Lens,
+    bend: float,
+    frustum: Frustum,
     shapes: Shapes,
     beyond: Array,
     near: float,
+    lattice: Array,
     rays: Array,
     spacing: float,
     bbox: Array,
@@ -348,17 +480,27 @@ def visible_shares(
     fewest: int,
     visible: Array,
 ) -> None:
-    """The share of each shape's rays that reach it before any other shape, written to `visible` (n, b); everything as
-    in `ray_kernels.visible_shares`, where shapes are boxes."""
-    boxes = len(shapes.halves)
+    """The share of each shape's rays that reach it before any other shape, written to `visible` (n, b).
+
+    As `ray_kernels.visible_shares`, but that shapes on which the `lattice` (2, h, w), a ray in the middle of every
+    `step` x `step` pixels, has `fewest` rays along each side, are looked at on it, and so are drawn but once a frame.
+    """
+    boxes, height, width = len(shapes.halves), lattice.shape[1], lattice.shape[2]
     placed = room(shapes)
-    depth, sides, fit = np.empty((boxes, 2)), np.empty(boxes, np.int64), np.empty(12)
-    others, is_placed = np.empty(boxes, np.int64), np.empty(boxes, np.bool_)
-    xs, ys, seen, other, spare = np.empty(0), np.empty(0), np.empty(0), np.empty(0), np.empty((2, 0))
+    depth, sides = np.empty((boxes, 2)), np.empty(boxes, np.int64)
+    others, is_placed, is_drawn = np.empty(boxes + 1, np.int64), np.empty(boxes, np.bool_), np.empty(boxes, np.bool_)
+    crops, starts = np.empty((boxes, 4), np.int64), np.zeros(boxes + 1, np.int64)
+    layers, size = np.empty(0), height * width
+    xs, ys, seen, hidden = np.empty(size), np.empty(size), np.empty(size), np.empty(size, np.bool_)
     for frame in range(len(Ts_world_camera)):
         T = Ts_world_camera[frame]
         place_bounds(T, shapes, depth, sides)
-        is_placed[:] = False
+        is_placed[:], is_drawn[:] = False, False
+        crops_of(bbox[frame], step, height, width, crops)
+        for b in range(boxes):
+            starts[b + 1] = starts[b] + crops[b, 2] * crops[b, 3]
+        if starts[boxes] > len(layers):
+            layers = np.empty(2 * starts[boxes])
         for b in range(boxes):
             u0, v0, u1, v1 = bbox[frame, b, 0], bbox[frame, b, 1], bbox[frame, b, 2], bbox[frame, b, 3]
             visible[frame, b] = np.nan if math.isnan(u0) else 1.0
@@ -376,7 +518,7 @@ def visible_shares(
                     and bbox[frame, c, 3] > v0
                 ):
                     if not is_placed[c]:
-                        place_shape(T, shapes, c, near, sides[c] == 0, placed)
+                        place_shape(T, lens, bend, frustum, shapes, c, near, sides[c] == 0, placed)
                         is_placed[c] = True
                     # A shape round the camera hides nothing: what it stands for is no solid block where the camera is.
                     if placed.kinds[c] != ROUND:
@@ -385,25 +527,42 @@ def visible_shares(
             if n == 0:
                 continue
             if not is_placed[b]:
-                place_shape(T, shapes, b, near, sides[b] == 0, placed)
+                place_shape(T, lens, bend, frustum, shapes, b, near, sides[b] == 0, placed)
                 is_placed[b] = True
-            for finer in (1, 4):
+            share = np.nan
+            if crops[b, 2] >= fewest and crops[b, 3] >= fewest:
+                others[n] = b
+                for k in range(n + 1):
+                    c = others[k]
+                    if not is_drawn[c]:
+                        row, column, rows, columns = crops[c, 0], crops[c, 1], crops[c, 2], crops[c, 3]
+                        grid = Grid((column + 0.5) * step, (row + 0.5) * step, step, step, rows, columns)
+                        copy_rays(lattice, row, column, rows, columns, xs, ys)
+                        layer = layers[starts[c] : starts[c + 1]]
+                        layer[:] = 0.0
+                        draw_shape(shapes, placed, c, near, frustum, grid, xs, ys, layer)
+                        is_drawn[c] = True
+                layer = layers[starts[b] : starts[b + 1]]
+                hidden[: len(layer)] = False
+                for k in range(n):
+                    c = others[k]
+                    hide(layer, crops[b], layers[starts[c] : starts[c + 1]], crops[c], hidden)
+                share = share_left(layer, hidden, len(layer))
+            finer = 1
+            while math.isnan(share) and finer <= 4:
                 rows = max(math.ceil((v1 - v0) * finer / step), fewest)
                 columns = max(math.ceil((u1 - u0) * finer / step), fewest)
                 du, dv, size = (u1 - u0) / columns, (v1 - v0) / rows, rows * columns
                 if size > len(seen):
-                    xs, ys, seen, other = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
-                    spare = np.empty((2, size))
+                    xs, ys, seen, hidden = np.empty(size), np.empty(size), np.empty(size), np.empty(size, np.bool_)
                 cast_grid(rays, spacing, u0, v0, du, dv, rows, columns, xs, ys)
-                fit_grid(xs, ys, rows, columns, fit)
-                seen[:size], other[:size] = 0.0, 0.0
-                draw_shape(shapes, placed, b, near, xs, ys, rows, columns, fit, seen, spare)
+                grid = Grid(u0 + 0.5 * du, v0 + 0.5 * dv, du, dv, rows, columns)
+                own, other = np.zeros(size), np.zeros(size)
+                draw_shape(shapes, placed, b, near, frustum, grid, xs, ys, own)
                 for k in range(n):
-                    draw_shape(shapes, placed, others[k], near, xs, ys, rows, columns, fit, other, spare)
-                met, left = 0, 0
+                    draw_shape(shapes, placed, others[k], near, frustum, grid, xs, ys, other)
                 for ray in range(size):
-                    met += seen[ray] > 0.0
-                    left += (seen[ray] > 0.0) & (other[ray] <= seen[ray] * NEARER)
-                if met > 0:
-                    visible[frame, b] = left / met
-                    break
+                    hidden[ray] = other[ray] > own[ray] * NEARER
+                share = share_left(own, hidden, size)
+                finer *= 4
+            visible[frame, b] = 1.0 if math.isnan(share) else share

@@ -1,17 +1,21 @@
 """How much of a shape, a box or a mesh, can be seen behind nearer shapes: triangles on grids of rays."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float
 
 from ars_web.errors import BadInput
+from ars_web.geometry import camera as cameras
 from ars_web.geometry import raster_kernels
 from ars_web.geometry.box import Box
 from ars_web.geometry.camera import Camera
 from ars_web.geometry.frame_blocks import over_blocks
 from ars_web.geometry.labels import NEAR
+from ars_web.geometry.lens import lens_tables
 from ars_web.geometry.mesh import Mesh
+from ars_web.geometry.raster_kernels import Frustum
 from ars_web.geometry.occlusion import BLOCK, FEWEST_RAYS, RAY_SPACING, rays_of_camera, visible_fractions
 from ars_web.geometry.shape_stack import kernel_shapes, stack_shapes
 
@@ -42,15 +46,21 @@ def visible_shares(
     if step < 1:
         raise BadInput(f"the step between rays must be at least 1 pixel, not {step}")
     n, b = len(Ts_world_camera), len(boxes)
-    visible, rays = np.empty((n, b)), rays_of_camera(camera)
+    visible, tables = np.empty((n, b)), lens_tables(camera)
+    bend, frustum = frustum_of(camera)
+    lattice, rays = rays_in_middles(camera, step), rays_of_camera(camera)
 
     def look(frames: slice) -> None:
         # Copies, so that the compiled loop never meets an array of another order or one that may only be read.
         raster_kernels.visible_shares(
             np.array(Ts_world_camera[frames], dtype=np.float64, order="C"),
+            tables.lens,
+            bend,
+            frustum,
             kernel_shapes(stack),
             stack.beyond,
             NEAR,
+            lattice,
             rays,
             float(RAY_SPACING),
             np.array(bbox[frames], dtype=np.float64, order="C"),
@@ -61,3 +71,24 @@ def visible_shares(
 
     over_blocks(look, n, block=BLOCK)
     return visible
+
+
+@lru_cache(maxsize=4)
+def rays_in_middles(camera: Camera, step: int) -> Float[np.ndarray, "2 h w"]:
+    """Points of the normalised plane in the middle of every `step` x `step` pixels: of every pixel, where `step` is 1;
+    NaN beyond the lens's valid radius. Kept for the next call."""
+    u = np.arange(step / 2, camera.width, step)
+    v = np.arange(step / 2, camera.height, step)
+    image = np.stack(np.meshgrid(u, v), axis=-1)
+    rays = cameras.normalised_from_pixels(camera, cameras.pixels_from_image(image))
+    return np.ascontiguousarray(np.moveaxis(rays, -1, 0))
+
+
+@lru_cache(maxsize=16)
+def frustum_of(camera: Camera) -> tuple[float, Frustum]:
+    """How much the camera bends straight lines where the kernels ask for it, pixels, and what its image shows."""
+    x, y = rays_of_camera(camera)
+    tables = lens_tables(camera)
+    radius = min(float(np.nanmax(np.hypot(x, y))), tables.lens.rim / (raster_kernels.MARGIN * (1 + 1e-9)))
+    bend = float(tables.bends_within(np.array([raster_kernels.MARGIN * radius]))[0])
+    return bend, Frustum(radius, *(float(side) for side in (np.nanmin(x), np.nanmax(x), np.nanmin(y), np.nanmax(y))))

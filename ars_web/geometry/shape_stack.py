@@ -90,10 +90,13 @@ def _stack(boxes: tuple[Box, ...], meshes: tuple[Mesh | None, ...]) -> ShapeStac
 
 def kernel_shapes(stack: ShapeStack) -> Shapes:
     """The stack for one thread: copies, because threads that count the users of one array stand in each other's way."""
+    a, b, c = (stack.vertices[stack.faces[:, i]] for i in range(3))
+    sides = np.max([((b - a) ** 2).sum(axis=1), ((c - b) ** 2).sum(axis=1), ((a - c) ** 2).sum(axis=1)], axis=0)
     return Shapes(
-        stack.vertices.copy(),
-        stack.faces.copy(),
-        stack.planes.copy(),
+        np.ascontiguousarray(stack.vertices.T),
+        np.ascontiguousarray(stack.faces.T),
+        np.ascontiguousarray(stack.planes.T),
+        sides,
         stack.first_vertex.copy(),
         stack.first_face.copy(),
         stack.Ts_world_bound.copy(),
