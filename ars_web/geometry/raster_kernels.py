@@ -22,12 +22,15 @@ Array = np.ndarray
 AHEAD = 1e-9
 """Metres of depth, from which on x / z and y / z are used."""
 
-MARGIN = 1.1
+MARGIN = 1.25
 """Times the largest radius that the image has on the normalised plane: up to there corners are said to have an image.
 Beyond, the lens may bend too much for the image of a corner to tell anything."""
 
 SLACK = 0.05
 """Pixels that rays may be off their image points, because they are taken between others, and corners' images."""
+
+STRAIGHT = 0.05
+"""Pixels that the chords of bent edges may be off."""
 
 FEW = 3
 """Columns of a triangle's box, up to which every ray in it is tried."""
@@ -46,15 +49,18 @@ class Shapes(NamedTuple):
         vertices: (3, v).
         faces: (3, f).
         planes: (4, f).
+        edges: (4, e) as `Mesh.edges`, their vertices and faces counted through all shapes.
         sides: (f,) the square of each face's longest side.
     """
 
     vertices: Array
     faces: Array
     planes: Array
+    edges: Array
     sides: Array
     first_vertex: Array
     first_face: Array
+    first_edge: Array
     Ts_world_bound: Array
     halves: Array
 
@@ -71,6 +77,7 @@ class Placed(NamedTuple):
             infinite where a corner has no image; and by how much they may be off the triangles of the corners' images.
         counts: (b,) how many faces are listed.
         kinds: (b,) OUTSIDE, ROUND or CUT.
+        front: (f,) whether a face is turned to the camera; of shapes that are OUTSIDE.
     """
 
     points: Array
@@ -80,6 +87,7 @@ class Placed(NamedTuple):
     reach: Array
     counts: Array
     kinds: Array
+    front: Array
 
 
 class Frustum(NamedTuple):
@@ -115,17 +123,18 @@ def room(shapes: Shapes) -> Placed:
         np.empty((5, f)),
         np.zeros(b, np.int64),
         np.zeros(b, np.int64),
+        np.empty(f, np.bool_),
     )
 
 
 @part
-def place_bounds(T_world_camera: Array, shapes: Shapes, depth: Array, sides: Array) -> None:
-    """The depths (b, 2) along the optical axis between which each shape's bound lies, and beyond which of its six
-    faces the camera is, as the bits of `sides` (b,): bit 2 i for the face at +half of axis i, bit 2 i + 1 at -half."""
+def place_bounds(T_world_camera: Array, shapes: Shapes, depth: Array, within: Array) -> None:
+    """The depths (b, 2) along the optical axis between which each shape's bound lies, and whether the camera is in it,
+    written to `within` (b,)."""
     Ts, halves = shapes.Ts_world_bound, shapes.halves
     for b in range(len(halves)):
         z, reach = 0.0, 0.0
-        sides[b] = 0
+        within[b] = True
         for i in range(3):
             o, a = 0.0, 0.0
             for j in range(3):
@@ -133,8 +142,26 @@ def place_bounds(T_world_camera: Array, shapes: Shapes, depth: Array, sides: Arr
                 a += Ts[b, j, i] * T_world_camera[j, 2]
             z -= a * o
             reach += abs(a) * halves[b, i]
-            sides[b] |= (o > halves[b, i]) << (2 * i) | (o < -halves[b, i]) << (2 * i + 1)
+            within[b] &= abs(o) < halves[b, i]
         depth[b, 0], depth[b, 1] = z - reach, z + reach
+
+
+@part
+def find_sides(T_world_camera: Array, parting: Array, sides: Array) -> None:
+    """On which side of the plane between each two shapes (b, b, 4) the camera is, written to `sides` (b, b): 1 on the
+    other's, -1 on the shape's own or in the plane, 0 where there is no plane."""
+    x, y, z = T_world_camera[0, 3], T_world_camera[1, 3], T_world_camera[2, 3]
+    for b in range(len(parting)):
+        for c in range(len(parting)):
+            plane = parting[b, c]
+            place = plane[0] * x + plane[1] * y + plane[2] * z + plane[3]
+            sides[b, c] = 1 if place > 0.0 else (-1 if place <= 0.0 else 0)
+
+
+@part
+def may_hide(c: int, b: int, depth: Array, sides: Array) -> bool:
+    """Whether c may be before b somewhere: by their depths, and not if the camera is on b's side of a plane between."""
+    return depth[c, 0] < depth[b, 1] and sides[b, c] >= 0 and sides[c, b] <= 0
 
 
 @part
@@ -161,48 +188,133 @@ def surrounds(T_world_camera: Array, shapes: Shapes, b: int) -> bool:
 
 
 @part
-def place_vertices(
-    T_world_camera: Array, lens: Lens, limit: float, vertices: Array, start: int, end: int, placed: Placed
-) -> None:
-    """The vertices from `start` to `end` in camera coordinates and in the image (camera.pixels_from_normalised); they
-    have an image up to a radius whose square is `limit`."""
-    points, image, nearness = placed.points, placed.image, placed.nearness
+def image_point(lens: Lens, x: float, y: float) -> tuple[float, float]:
+    """Image coordinates of a point of the normalised plane within the lens's rim (camera.pixels_from_normalised)."""
+    r2 = x * x + y * y
+    if lens.fisheye:
+        r = math.sqrt(r2)
+        angle = math.atan(r)
+        t2 = angle * angle
+        scale = angle * (1.0 + t2 * (lens.k1 + t2 * (lens.k2 + t2 * (lens.k3 + t2 * lens.k4)))) / max(r, 1e-12)
+        if r < 1e-12:
+            scale = 1.0
+        return lens.fx * x * scale + lens.cx, lens.fy * y * scale + lens.cy
+    radial = 1.0 + r2 * (lens.k1 + r2 * (lens.k2 + r2 * lens.k3))
+    u = x * radial + 2.0 * lens.p1 * x * y + lens.p2 * (r2 + 2.0 * x * x)
+    v = y * radial + lens.p1 * (r2 + 2.0 * y * y) + 2.0 * lens.p2 * x * y
+    return lens.fx * u + lens.cx, lens.fy * v + lens.cy
+
+
+@part
+def place_shape(T_world_camera: Array, shapes: Shapes, b: int, near: float, within: bool, placed: Placed) -> None:
+    """One shape's vertices in camera coordinates, what kind it is, and which of its faces are turned to the camera;
+    `within`: whether the camera is in its bound."""
     r00, r01, r02 = T_world_camera[0, 0], T_world_camera[1, 0], T_world_camera[2, 0]
     r10, r11, r12 = T_world_camera[0, 1], T_world_camera[1, 1], T_world_camera[2, 1]
     r20, r21, r22 = T_world_camera[0, 2], T_world_camera[1, 2], T_world_camera[2, 2]
     px, py, pz = T_world_camera[0, 3], T_world_camera[1, 3], T_world_camera[2, 3]
+    vertices, points, planes, cut = shapes.vertices, placed.points, shapes.planes, False
     # Short loops that each do one thing: the processor takes several vertices at a time.
-    for i in range(start, end):
+    for i in range(shapes.first_vertex[b], shapes.first_vertex[b + 1]):
         x, y, z = vertices[0, i] - px, vertices[1, i] - py, vertices[2, i] - pz
         points[0, i] = r00 * x + r01 * y + r02 * z
         points[1, i] = r10 * x + r11 * y + r12 * z
         points[2, i] = r20 * x + r21 * y + r22 * z
-    k1, k2, k3, k4, p1, p2 = lens.k1, lens.k2, lens.k3, lens.k4, lens.p1, lens.p2
-    fx, fy, cx, cy = lens.fx, lens.fy, lens.cx, lens.cy
-    if lens.fisheye:
-        for i in range(start, end):
-            inverse = 1.0 / max(points[2, i], AHEAD)
-            x, y = points[0, i] * inverse, points[1, i] * inverse
-            r2 = x * x + y * y
-            r = math.sqrt(r2)
-            angle = math.atan(r)
-            t2 = angle * angle
-            scale = angle * (1.0 + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4)))) / r if r > 1e-12 else 1.0
-            seen = (points[2, i] > AHEAD) & (r2 < limit)
-            image[0, i] = fx * x * scale + cx if seen else np.nan
-            image[1, i] = fy * y * scale + cy
-            nearness[i] = inverse * inverse
-    else:
-        for i in range(start, end):
-            inverse = 1.0 / max(points[2, i], AHEAD)
-            x, y = points[0, i] * inverse, points[1, i] * inverse
-            r2 = x * x + y * y
-            radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-            seen = (points[2, i] > AHEAD) & (r2 < limit)
-            u = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
-            image[0, i] = fx * u + cx if seen else np.nan
-            image[1, i] = fy * (y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y) + cy
-            nearness[i] = inverse * inverse
+    for i in range(shapes.first_vertex[b], shapes.first_vertex[b + 1]):
+        cut |= points[2, i] < near
+    placed.kinds[b] = CUT if cut else OUTSIDE
+    if within and surrounds(T_world_camera, shapes, b):
+        placed.kinds[b] = ROUND
+    elif not cut:
+        for f in range(shapes.first_face[b], shapes.first_face[b + 1]):
+            placed.front[f] = planes[0, f] * px + planes[1, f] * py + planes[2, f] * pz + planes[3, f] > 0.0
+
+
+@part
+def place_images(lens: Lens, limit: float, bend: float, shapes: Shapes, b: int, placed: Placed) -> None:
+    """What `draw` needs of a shape that is placed; vertices are said to have an image up to a radius whose square is
+    `limit`, and to there `bend` bounds the second derivative of a straight line's image, in pixels."""
+    points, image, nearness = placed.points, placed.image, placed.nearness
+    for i in range(shapes.first_vertex[b], shapes.first_vertex[b + 1]):
+        inverse = 1.0 / max(points[2, i], AHEAD)
+        x, y = points[0, i] * inverse, points[1, i] * inverse
+        u, v = image_point(lens, x, y)
+        image[0, i] = u if (points[2, i] > AHEAD) & (x * x + y * y < limit) else np.nan
+        image[1, i], nearness[i] = v, inverse * inverse
+    first, listed, outside = shapes.first_face[b], placed.listed, placed.kinds[b] == OUTSIDE
+    n = first
+    for f in range(first, shapes.first_face[b + 1]):
+        # A closed surface is first met from outside.
+        listed[n] = f
+        n += 1 if not outside or placed.front[f] else 0
+    placed.counts[b] = n - first
+    # On the normalised plane a side is as long as in space times sqrt(1 + r^2) / z, at most.
+    place_faces(shapes.faces, shapes.sides, 0.125 * bend * (1.0 + limit), first, n, placed)
+
+
+@part
+def contour(
+    lens: Lens, limit: float, bend: float, shapes: Shapes, b: int, placed: Placed, pieces: Array, k: int
+) -> tuple[Array, int]:
+    """Append the images (4,) from (u, v) to (u, v) of the edges between what of a shape is turned to the camera and what
+    is not to `pieces` after the first k; k itself where one of them is beyond `limit`.
+
+    The sum of the edges' turns round a ray is how often the ray enters the shape (contour_kernels.py).
+    """
+    points, edges, front, start = placed.points, shapes.edges, placed.front, k
+    for e in range(shapes.first_edge[b], shapes.first_edge[b + 1]):
+        if front[edges[2, e]] == front[edges[3, e]]:
+            continue
+        i, j = edges[0, e], edges[1, e]
+        if not front[edges[2, e]]:
+            i, j = j, i
+        x0, y0 = points[0, i] / points[2, i], points[1, i] / points[2, i]
+        x1, y1 = points[0, j] / points[2, j], points[1, j] / points[2, j]
+        if max(x0 * x0 + y0 * y0, x1 * x1 + y1 * y1) > limit:
+            return pieces, start
+        off = 0.125 * bend * ((x1 - x0) ** 2 + (y1 - y0) ** 2)
+        n = max(math.ceil(math.sqrt(off / STRAIGHT)), 1)
+        if k + n > len(pieces):
+            more = np.empty((2 * (k + n), 4))
+            more[:k] = pieces[:k]
+            pieces = more
+        u, v = image_point(lens, x0, y0)
+        for s in range(1, n + 1):
+            pieces[k, 0], pieces[k, 1] = u, v
+            # An edge's end is the next one's start, to the last bit.
+            x, y = (x1, y1) if s == n else (x0 + (x1 - x0) * s / n, y0 + (y1 - y0) * s / n)
+            u, v = image_point(lens, x, y)
+            pieces[k, 2], pieces[k, 3] = u, v
+            k += 1
+    return pieces, k
+
+
+@part
+def cover(pieces: Array, start: int, end: int, grid: Grid, turns: Array, covered: Array) -> None:
+    """Mark in `covered` those of a grid's rays that the contour in `pieces` from `start` to `end` runs round."""
+    rows, columns = grid.rows, grid.columns
+    wide = columns + 1
+    turns[: rows * wide] = 0
+    by_du, by_dv = 1.0 / grid.du, 1.0 / grid.dv
+    for k in range(start, end):
+        column, row = (pieces[k, 0] - grid.u) * by_du, (pieces[k, 1] - grid.v) * by_dv
+        end_column, end_row = (pieces[k, 2] - grid.u) * by_du, (pieces[k, 3] - grid.v) * by_dv
+        turn = 1
+        if end_row < row:
+            column, row, end_column, end_row, turn = end_column, end_row, column, row, -1
+        first = math.ceil(max(row, 0.0))
+        last = math.ceil(min(end_row, float(rows)))
+        if first >= last:
+            continue
+        slope = (end_column - column) / (end_row - row)
+        for i in range(first, last):
+            place = min(max(column + (i - row) * slope, 0.0), float(columns))
+            turns[i * wide + math.ceil(place)] += turn
+    for i in range(rows):
+        sum_ = 0
+        for j in range(columns):
+            sum_ += turns[i * wide + j]
+            covered[i * columns + j] |= sum_ != 0
 
 
 @part
@@ -223,38 +335,6 @@ def place_faces(
         reach[2, k] = min(va, min(vb, vc)) - off if known else -np.inf
         reach[3, k] = max(va, max(vb, vc)) + off if known else np.inf
         reach[4, k] = off
-
-
-@part
-def place_shape(
-    T_world_camera: Array, lens: Lens, bend: float, frustum: Frustum, shapes: Shapes, b: int, near: float, within: bool, placed: Placed
-) -> None:
-    """One shape as the camera sees it; `bend`: bound on the second derivative of a straight line's image, pixels, where
-    corners have an image; `within`: whether the camera is in the shape's bound."""
-    start, end = shapes.first_vertex[b], shapes.first_vertex[b + 1]
-    limit = (MARGIN * frustum.radius) ** 2
-    place_vertices(T_world_camera, lens, limit, shapes.vertices, start, end, placed)
-    nearest = np.inf
-    for i in range(start, end):
-        nearest = placed.points[2, i] if placed.points[2, i] < nearest else nearest
-    kind = OUTSIDE if nearest >= near else CUT
-    if within and surrounds(T_world_camera, shapes, b):
-        kind = ROUND
-    first, listed, planes = shapes.first_face[b], placed.listed, shapes.planes
-    n = first
-    if kind == OUTSIDE:
-        # Only what faces the camera: a closed surface is first met from outside.
-        px, py, pz = T_world_camera[0, 3], T_world_camera[1, 3], T_world_camera[2, 3]
-        for f in range(first, shapes.first_face[b + 1]):
-            listed[n] = f
-            n += 1 if planes[0, f] * px + planes[1, f] * py + planes[2, f] * pz + planes[3, f] > 0.0 else 0
-    else:
-        n = shapes.first_face[b + 1]
-        for f in range(first, n):
-            listed[f] = f
-    # On the normalised plane a side is as long as in space times sqrt(1 + r^2) / z, at most.
-    place_faces(shapes.faces, shapes.sides, 0.125 * bend * (1.0 + limit), first, n, placed)
-    placed.counts[b], placed.kinds[b] = n - first, kind
 
 
 @part
@@ -416,53 +496,6 @@ def cast_grid(
             ys[i * columns + j] = line_y[k] + right * (line_y[k + 1] - line_y[k])
 
 
-@part
-def copy_rays(lattice: Array, row: int, column: int, rows: int, columns: int, xs: Array, ys: Array) -> None:
-    """A part of a lattice (2, h, w), row by row, written to `xs` and `ys`."""
-    for i in range(rows):
-        for j in range(columns):
-            xs[i * columns + j] = lattice[0, row + i, column + j]
-            ys[i * columns + j] = lattice[1, row + i, column + j]
-
-
-@part
-def crops_of(bbox: Array, step: float, height: int, width: int, crops: Array) -> None:
-    """The parts of the lattice, a ray in the middle of every `step` x `step` pixels, that boxes (b, 4) hold, written to
-    `crops` (b, 4): first row, first column, rows, columns; none where a box is NaN."""
-    for b in range(len(bbox)):
-        if math.isnan(bbox[b, 0]):
-            crops[b] = 0
-            continue
-        column = max(math.ceil(bbox[b, 0] / step - 0.5), 0)
-        row = max(math.ceil(bbox[b, 1] / step - 0.5), 0)
-        crops[b, 0], crops[b, 1] = row, column
-        crops[b, 2] = max(min(math.floor(bbox[b, 3] / step - 0.5) + 1, height) - row, 0)
-        crops[b, 3] = max(min(math.floor(bbox[b, 2] / step - 0.5) + 1, width) - column, 0)
-
-
-@part
-def hide(seen: Array, crop: Array, other: Array, crop_of_other: Array, hidden: Array) -> None:
-    """Mark those of a shape's rays, on its part of the lattice, that another meets first."""
-    row, column = max(crop[0], crop_of_other[0]), max(crop[1], crop_of_other[1])
-    end_row = min(crop[0] + crop[2], crop_of_other[0] + crop_of_other[2])
-    columns = min(crop[1] + crop[3], crop_of_other[1] + crop_of_other[3]) - column
-    for i in range(row, end_row):
-        here = (i - crop[0]) * crop[3] + column - crop[1]
-        there = (i - crop_of_other[0]) * crop_of_other[3] + column - crop_of_other[1]
-        for j in range(columns):
-            hidden[here + j] |= other[there + j] > seen[here + j] * NEARER
-
-
-@part
-def share_left(seen: Array, hidden: Array, n: int) -> float:
-    """The share that is not hidden of the rays that meet a shape; NaN where none does."""
-    met, left = 0, 0
-    for ray in range(n):
-        met += 1 if seen[ray] > 0.0 else 0
-        left += 1 if (seen[ray] > 0.0) & (not hidden[ray]) else 0
-    return left / met if met > 0 else np.nan
-
-
 @entry
 def visible_shares(
     Ts_world_camera: Array,
@@ -470,9 +503,8 @@ def visible_shares(
     bend: float,
     frustum: Frustum,
     shapes: Shapes,
-    beyond: Array,
+    parting: Array,
     near: float,
-    lattice: Array,
     rays: Array,
     spacing: float,
     bbox: Array,
@@ -480,89 +512,94 @@ def visible_shares(
     fewest: int,
     visible: Array,
 ) -> None:
-    """The share of each shape's rays that reach it before any other shape, written to `visible` (n, b).
+    """The share of each shape's rays that reach it before any other shape, written to `visible` (n, b); the grids of
+    rays are those of `ray_kernels.visible_shares`.
 
-    As `ray_kernels.visible_shares`, but that shapes on which the `lattice` (2, h, w), a ray in the middle of every
-    `step` x `step` pixels, has `fewest` rays along each side, are looked at on it, and so are drawn but once a frame.
+    Where a plane tells that one shape is before the other, only the other's contour is looked at.
     """
-    boxes, height, width = len(shapes.halves), lattice.shape[1], lattice.shape[2]
+    boxes, limit = len(shapes.halves), (MARGIN * frustum.radius) ** 2
     placed = room(shapes)
-    depth, sides = np.empty((boxes, 2)), np.empty(boxes, np.int64)
-    others, is_placed, is_drawn = np.empty(boxes + 1, np.int64), np.empty(boxes, np.bool_), np.empty(boxes, np.bool_)
-    crops, starts = np.empty((boxes, 4), np.int64), np.zeros(boxes + 1, np.int64)
-    layers, size = np.empty(0), height * width
-    xs, ys, seen, hidden = np.empty(size), np.empty(size), np.empty(size), np.empty(size, np.bool_)
+    depth, sides, others = np.empty((boxes, 2)), np.empty((boxes, boxes), np.int64), np.empty(boxes, np.int64)
+    within = np.empty(boxes, np.bool_)
+    is_placed, has_images, parted = np.empty(boxes, np.bool_), np.empty(boxes, np.bool_), np.empty(boxes, np.bool_)
+    pieces, starts, ends = np.empty((4096, 4)), np.zeros(boxes, np.int64), np.zeros(boxes, np.int64)
+    xs, ys, own, other = np.empty(0), np.empty(0), np.empty(0), np.empty(0)
+    seen, hidden, turns = np.empty(0, np.bool_), np.empty(0, np.bool_), np.empty(0, np.int64)
     for frame in range(len(Ts_world_camera)):
-        T = Ts_world_camera[frame]
-        place_bounds(T, shapes, depth, sides)
-        is_placed[:], is_drawn[:] = False, False
-        crops_of(bbox[frame], step, height, width, crops)
-        for b in range(boxes):
-            starts[b + 1] = starts[b] + crops[b, 2] * crops[b, 3]
-        if starts[boxes] > len(layers):
-            layers = np.empty(2 * starts[boxes])
+        T, used = Ts_world_camera[frame], 0
+        place_bounds(T, shapes, depth, within)
+        find_sides(T, parting, sides)
+        is_placed[:], has_images[:] = False, False
         for b in range(boxes):
             u0, v0, u1, v1 = bbox[frame, b, 0], bbox[frame, b, 1], bbox[frame, b, 2], bbox[frame, b, 3]
             visible[frame, b] = np.nan if math.isnan(u0) else 1.0
             n = 0
             for c in range(boxes):
-                # A plane that parts two bounds tells which of the shapes cannot be before the other.
                 if (
                     c != b
-                    and depth[c, 0] < depth[b, 1]
-                    and beyond[b, c] & ~sides[b] == 0
-                    and beyond[c, b] & sides[c] == 0
+                    and may_hide(c, b, depth, sides)
                     and bbox[frame, c, 0] < u1
                     and bbox[frame, c, 2] > u0
                     and bbox[frame, c, 1] < v1
                     and bbox[frame, c, 3] > v0
                 ):
-                    if not is_placed[c]:
-                        place_shape(T, lens, bend, frustum, shapes, c, near, sides[c] == 0, placed)
-                        is_placed[c] = True
-                    # A shape round the camera hides nothing: what it stands for is no solid block where the camera is.
-                    if placed.kinds[c] != ROUND:
-                        others[n] = c
-                        n += 1
+                    others[n] = c
+                    n += 1
             if n == 0:
                 continue
-            if not is_placed[b]:
-                place_shape(T, lens, bend, frustum, shapes, b, near, sides[b] == 0, placed)
-                is_placed[b] = True
-            share = np.nan
-            if crops[b, 2] >= fewest and crops[b, 3] >= fewest:
-                others[n] = b
+            for k in range(n + 1):
+                c = others[k] if k < n else b
+                if not is_placed[c]:
+                    place_shape(T, shapes, c, near, within[c], placed)
+                    starts[c], is_placed[c] = used, True
+                    if placed.kinds[c] == OUTSIDE:
+                        pieces, used = contour(lens, limit, bend, shapes, c, placed, pieces, used)
+                    ends[c] = used
+            by_depth = ends[b] == starts[b]
+            for k in range(n):
+                c = others[k]
+                parted[k] = ends[c] > starts[c] and placed.kinds[b] != ROUND and not may_hide(b, c, depth, sides)
+                by_depth = by_depth or not parted[k]
+            if by_depth:
                 for k in range(n + 1):
-                    c = others[k]
-                    if not is_drawn[c]:
-                        row, column, rows, columns = crops[c, 0], crops[c, 1], crops[c, 2], crops[c, 3]
-                        grid = Grid((column + 0.5) * step, (row + 0.5) * step, step, step, rows, columns)
-                        copy_rays(lattice, row, column, rows, columns, xs, ys)
-                        layer = layers[starts[c] : starts[c + 1]]
-                        layer[:] = 0.0
-                        draw_shape(shapes, placed, c, near, frustum, grid, xs, ys, layer)
-                        is_drawn[c] = True
-                layer = layers[starts[b] : starts[b + 1]]
-                hidden[: len(layer)] = False
-                for k in range(n):
-                    c = others[k]
-                    hide(layer, crops[b], layers[starts[c] : starts[c + 1]], crops[c], hidden)
-                share = share_left(layer, hidden, len(layer))
-            finer = 1
-            while math.isnan(share) and finer <= 4:
+                    c = others[k] if k < n else b
+                    if not has_images[c] and (k == n or not parted[k]):
+                        place_images(lens, limit, bend, shapes, c, placed)
+                        has_images[c] = True
+            for finer in (1, 4):
                 rows = max(math.ceil((v1 - v0) * finer / step), fewest)
                 columns = max(math.ceil((u1 - u0) * finer / step), fewest)
                 du, dv, size = (u1 - u0) / columns, (v1 - v0) / rows, rows * columns
-                if size > len(seen):
-                    xs, ys, seen, hidden = np.empty(size), np.empty(size), np.empty(size), np.empty(size, np.bool_)
-                cast_grid(rays, spacing, u0, v0, du, dv, rows, columns, xs, ys)
+                if size > len(own):
+                    xs, ys, own, other = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
+                    seen, hidden = np.empty(size, np.bool_), np.empty(size, np.bool_)
+                if size + rows > len(turns):
+                    turns = np.empty(2 * (size + rows), np.int64)
                 grid = Grid(u0 + 0.5 * du, v0 + 0.5 * dv, du, dv, rows, columns)
-                own, other = np.zeros(size), np.zeros(size)
-                draw_shape(shapes, placed, b, near, frustum, grid, xs, ys, own)
+                seen[:size], hidden[:size] = False, False
+                if by_depth:
+                    cast_grid(rays, spacing, u0, v0, du, dv, rows, columns, xs, ys)
+                    own[:size], other[:size] = 0.0, 0.0
+                    draw_shape(shapes, placed, b, near, frustum, grid, xs, ys, own)
+                if ends[b] > starts[b]:
+                    cover(pieces, starts[b], ends[b], grid, turns, seen)
+                else:
+                    for ray in range(size):
+                        seen[ray] = own[ray] > 0.0
                 for k in range(n):
-                    draw_shape(shapes, placed, others[k], near, frustum, grid, xs, ys, other)
+                    c = others[k]
+                    # A shape round the camera hides nothing: what it stands for is no solid block where the camera is.
+                    if parted[k]:
+                        cover(pieces, starts[c], ends[c], grid, turns, hidden)
+                    elif placed.kinds[c] != ROUND:
+                        draw_shape(shapes, placed, c, near, frustum, grid, xs, ys, other)
+                met, left = 0, 0
                 for ray in range(size):
-                    hidden[ray] = other[ray] > own[ray] * NEARER
-                share = share_left(own, hidden, size)
-                finer *= 4
-            visible[frame, b] = 1.0 if math.isnan(share) else share
+                    if by_depth:
+                        # The rays that only the contour's chords hold have no depth, and are not hidden.
+                        hidden[ray] |= (own[ray] > 0.0) & (other[ray] > own[ray] * NEARER)
+                    met += 1 if seen[ray] else 0
+                    left += 1 if seen[ray] & (not hidden[ray]) else 0
+                if met > 0:
+                    visible[frame, b] = left / met
+                    break

@@ -7,7 +7,6 @@ import numpy as np
 from jaxtyping import Float
 
 from ars_web.errors import BadInput
-from ars_web.geometry import camera as cameras
 from ars_web.geometry import raster_kernels
 from ars_web.geometry.box import Box
 from ars_web.geometry.camera import Camera
@@ -48,7 +47,7 @@ def visible_shares(
     n, b = len(Ts_world_camera), len(boxes)
     visible, tables = np.empty((n, b)), lens_tables(camera)
     bend, frustum = frustum_of(camera)
-    lattice, rays = rays_in_middles(camera, step), rays_of_camera(camera)
+    rays = rays_of_camera(camera)
 
     def look(frames: slice) -> None:
         # Copies, so that the compiled loop never meets an array of another order or one that may only be read.
@@ -58,9 +57,8 @@ def visible_shares(
             bend,
             frustum,
             kernel_shapes(stack),
-            stack.beyond,
+            stack.parting.copy(),
             NEAR,
-            lattice,
             rays,
             float(RAY_SPACING),
             np.array(bbox[frames], dtype=np.float64, order="C"),
@@ -73,22 +71,14 @@ def visible_shares(
     return visible
 
 
-@lru_cache(maxsize=4)
-def rays_in_middles(camera: Camera, step: int) -> Float[np.ndarray, "2 h w"]:
-    """Points of the normalised plane in the middle of every `step` x `step` pixels: of every pixel, where `step` is 1;
-    NaN beyond the lens's valid radius. Kept for the next call."""
-    u = np.arange(step / 2, camera.width, step)
-    v = np.arange(step / 2, camera.height, step)
-    image = np.stack(np.meshgrid(u, v), axis=-1)
-    rays = cameras.normalised_from_pixels(camera, cameras.pixels_from_image(image))
-    return np.ascontiguousarray(np.moveaxis(rays, -1, 0))
-
-
 @lru_cache(maxsize=16)
 def frustum_of(camera: Camera) -> tuple[float, Frustum]:
     """How much the camera bends straight lines where the kernels ask for it, pixels, and what its image shows."""
-    x, y = rays_of_camera(camera)
+    rays = rays_of_camera(camera)
+    x, y = rays[:, np.isfinite(rays).all(axis=0)]
+    if x.size == 0:
+        return 0.0, Frustum(0.0, 0.0, 0.0, 0.0, 0.0)
     tables = lens_tables(camera)
-    radius = min(float(np.nanmax(np.hypot(x, y))), tables.lens.rim / (raster_kernels.MARGIN * (1 + 1e-9)))
+    radius = min(float(np.hypot(x, y).max()), tables.lens.rim / (raster_kernels.MARGIN * (1 + 1e-9)))
     bend = float(tables.bends_within(np.array([raster_kernels.MARGIN * radius]))[0])
-    return bend, Frustum(radius, *(float(side) for side in (np.nanmin(x), np.nanmax(x), np.nanmin(y), np.nanmax(y))))
+    return bend, Frustum(radius, *(float(side) for side in (x.min(), x.max(), y.min(), y.max())))
