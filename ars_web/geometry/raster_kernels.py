@@ -90,16 +90,6 @@ class Placed(NamedTuple):
     front: Array
 
 
-class Frustum(NamedTuple):
-    """What of the normalised plane an image shows: the largest radius, the least and largest x, and y."""
-
-    radius: float
-    low_x: float
-    high_x: float
-    low_y: float
-    high_y: float
-
-
 class Grid(NamedTuple):
     """Rays row by row, at the image points (u + j du, v + i dv)."""
 
@@ -357,13 +347,25 @@ def trim(image: Array, i: int, j: int, m: int, off: float, grid: Grid, bounds: A
 
 
 @part
+def bounds_of_rays(xs: Array, ys: Array, n: int) -> tuple[float, float, float, float]:
+    """The least and largest x, and the least and largest y, of the first n rays; those beyond the lens are NaN."""
+    low_x, high_x, low_y, high_y = np.inf, -np.inf, np.inf, -np.inf
+    for ray in range(n):
+        x, y = xs[ray], ys[ray]
+        low_x = x if x < low_x else low_x
+        high_x = x if x > high_x else high_x
+        low_y = y if y < low_y else low_y
+        high_y = y if y > high_y else high_y
+    return low_x, high_x, low_y, high_y
+
+
+@part
 def draw(
     shapes: Shapes,
     placed: Placed,
     b: int,
     side: float,
     near: float,
-    frustum: Frustum,
     grid: Grid,
     xs: Array,
     ys: Array,
@@ -376,7 +378,7 @@ def draw(
     furthest, rows, columns = 1.0 / near, grid.rows, grid.columns
     u, v, by_du, by_dv = grid.u, grid.v, 1.0 / grid.du, 1.0 / grid.dv
     last_row, last_column = rows - 1.0, columns - 1.0
-    low_x, high_x, low_y, high_y = frustum.low_x, frustum.high_x, frustum.low_y, frustum.high_y
+    low_x, high_x, low_y, high_y = -np.inf, np.inf, -np.inf, np.inf
     first = shapes.first_face[b]
     for k in range(first, first + placed.counts[b]):
         first_column = math.ceil(max((reach[0, k] - u) * by_du, 0.0))
@@ -391,6 +393,8 @@ def draw(
         xj, yj, zj = P[0, j], P[1, j], P[2, j]
         xm, ym, zm = P[0, m], P[1, m], P[2, m]
         if reach[1, k] == np.inf:
+            if low_x == -np.inf:
+                low_x, high_x, low_y, high_y = bounds_of_rays(xs, ys, rows * columns)
             if (
                 max(zi, max(zj, zm)) < near
                 or min(xi - high_x * zi, min(xj - high_x * zj, xm - high_x * zm)) > 0.0
@@ -439,7 +443,6 @@ def draw_shape(
     placed: Placed,
     b: int,
     near: float,
-    frustum: Frustum,
     grid: Grid,
     xs: Array,
     ys: Array,
@@ -449,14 +452,14 @@ def draw_shape(
     is cut off at the near plane, and closed there; from within it, its far side is met."""
     kind = placed.kinds[b]
     if kind == OUTSIDE:
-        draw(shapes, placed, b, 1.0, near, frustum, grid, xs, ys, drawn)
+        draw(shapes, placed, b, 1.0, near, grid, xs, ys, drawn)
     elif kind == ROUND:
-        draw(shapes, placed, b, 0.0, near, frustum, grid, xs, ys, drawn)
+        draw(shapes, placed, b, 0.0, near, grid, xs, ys, drawn)
     else:
         n = grid.rows * grid.columns
         front, back = np.zeros(n), np.zeros(n)
-        draw(shapes, placed, b, 1.0, near, frustum, grid, xs, ys, front)
-        draw(shapes, placed, b, -1.0, near, frustum, grid, xs, ys, back)
+        draw(shapes, placed, b, 1.0, near, grid, xs, ys, front)
+        draw(shapes, placed, b, -1.0, near, grid, xs, ys, back)
         for ray in range(n):
             # What is left before it is entered was entered nearer than the near plane.
             met = front[ray] if back[ray] <= front[ray] * NEARER else 1.0 / near
@@ -501,7 +504,7 @@ def visible_shares(
     Ts_world_camera: Array,
     lens: Lens,
     bend: float,
-    frustum: Frustum,
+    radius: float,
     shapes: Shapes,
     parting: Array,
     near: float,
@@ -517,7 +520,7 @@ def visible_shares(
 
     Where a plane tells that one shape is before the other, only the other's contour is looked at.
     """
-    boxes, limit = len(shapes.halves), (MARGIN * frustum.radius) ** 2
+    boxes, limit = len(shapes.halves), (MARGIN * radius) ** 2
     placed = room(shapes)
     depth, sides, others = np.empty((boxes, 2)), np.empty((boxes, boxes), np.int64), np.empty(boxes, np.int64)
     within = np.empty(boxes, np.bool_)
@@ -580,7 +583,7 @@ def visible_shares(
                 if by_depth:
                     cast_grid(rays, spacing, u0, v0, du, dv, rows, columns, xs, ys)
                     own[:size], other[:size] = 0.0, 0.0
-                    draw_shape(shapes, placed, b, near, frustum, grid, xs, ys, own)
+                    draw_shape(shapes, placed, b, near, grid, xs, ys, own)
                 if ends[b] > starts[b]:
                     cover(pieces, starts[b], ends[b], grid, turns, seen)
                 else:
@@ -592,7 +595,7 @@ def visible_shares(
                     if parted[k]:
                         cover(pieces, starts[c], ends[c], grid, turns, hidden)
                     elif placed.kinds[c] != ROUND:
-                        draw_shape(shapes, placed, c, near, frustum, grid, xs, ys, other)
+                        draw_shape(shapes, placed, c, near, grid, xs, ys, other)
                 met, left = 0, 0
                 for ray in range(size):
                     if by_depth:
@@ -603,3 +606,83 @@ def visible_shares(
                 if met > 0:
                     visible[frame, b] = left / met
                     break
+
+
+@entry
+def instances(
+    T_world_camera: Array,
+    lens: Lens,
+    bend: float,
+    radius: float,
+    shapes: Shapes,
+    near: float,
+    rays: Array,
+    tile: int,
+    visible: Array,
+    crops: Array,
+) -> Array:
+    """The nearest shape at the middle of each pixel, written to `visible` (h, w), -1 where none is, and where each
+    shape's silhouette is, written to `crops` (b, 4): first row, first column, rows and columns; answered are the
+    silhouettes' pixels, one after the other, row by row.
+
+    `rays` (2, h, w) are those of the pixels' middles. Pixels are looked at in tiles of `tile` x `tile`.
+    """
+    boxes, limit, (height, width) = len(shapes.halves), (MARGIN * radius) ** 2, visible.shape
+    placed, depth, within = room(shapes), np.empty((boxes, 2)), np.empty(boxes, np.bool_)
+    place_bounds(T_world_camera, shapes, depth, within)
+    xs, ys, drawn = np.empty(tile * tile), np.empty(tile * tile), np.empty(tile * tile)
+    nearest, layer = np.zeros((height, width)), np.zeros((height, width))
+    pixels, used = np.empty(height * width, np.bool_), 0
+    visible[:] = -1
+    for b in range(boxes):
+        crops[b] = 0
+        if depth[b, 1] < near:
+            continue
+        place_shape(T_world_camera, shapes, b, near, within[b], placed)
+        place_images(lens, limit, bend, shapes, b, placed)
+        first = shapes.first_face[b]
+        u0, u1, v0, v1 = np.inf, -np.inf, np.inf, -np.inf
+        for k in range(first, first + placed.counts[b]):
+            u0, u1 = min(u0, placed.reach[0, k]), max(u1, placed.reach[1, k])
+            v0, v1 = min(v0, placed.reach[2, k]), max(v1, placed.reach[3, k])
+        if not (u0 < width and v0 < height and u1 > 0.0 and v1 > 0.0):
+            continue
+        left, top = int(max(u0, 0.0)), int(max(v0, 0.0))
+        right, bottom = int(min(math.ceil(min(u1, 1e9)), width)), int(min(math.ceil(min(v1, 1e9)), height))
+        low_row, low_column, high_row, high_column = height, width, -1, -1
+        for row in range(top, bottom, tile):
+            for column in range(left, right, tile):
+                rows, columns = min(tile, bottom - row), min(tile, right - column)
+                for i in range(rows):
+                    for j in range(columns):
+                        ray = i * columns + j
+                        xs[ray], ys[ray] = rays[0, row + i, column + j], rays[1, row + i, column + j]
+                        drawn[ray] = 0.0
+                grid = Grid(column + 0.5, row + 0.5, 1.0, 1.0, rows, columns)
+                draw_shape(shapes, placed, b, near, grid, xs, ys, drawn)
+                for i in range(rows):
+                    for j in range(columns):
+                        met = drawn[i * columns + j]
+                        layer[row + i, column + j] = met
+                        if met > 0.0:
+                            low_row, high_row = min(low_row, row + i), max(high_row, row + i)
+                            low_column, high_column = min(low_column, column + j), max(high_column, column + j)
+        if high_row < 0:
+            continue
+        rows, columns = high_row + 1 - low_row, high_column + 1 - low_column
+        crops[b, 0], crops[b, 1], crops[b, 2], crops[b, 3] = low_row, low_column, rows, columns
+        if used + rows * columns > len(pixels):
+            more = np.empty(2 * (used + rows * columns), np.bool_)
+            more[:used] = pixels[:used]
+            pixels = more
+        for i in range(low_row, high_row + 1):
+            for j in range(low_column, high_column + 1):
+                met, other = layer[i, j], visible[i, j]
+                pixels[used] = met > 0.0
+                used += 1
+                # A shape round the camera hides nothing: all others are before it.
+                behind = placed.kinds[b] == ROUND and other >= 0 and placed.kinds[other] != ROUND
+                before = other >= 0 and placed.kinds[b] != ROUND and placed.kinds[other] == ROUND
+                if met > 0.0 and not behind and (before or met > nearest[i, j] * NEARER):
+                    nearest[i, j], visible[i, j] = met, b
+    return pixels[:used].copy()

@@ -14,7 +14,6 @@ from ars_web.geometry.frame_blocks import over_blocks
 from ars_web.geometry.labels import NEAR
 from ars_web.geometry.lens import lens_tables
 from ars_web.geometry.mesh import Mesh
-from ars_web.geometry.raster_kernels import Frustum
 from ars_web.geometry.occlusion import BLOCK, FEWEST_RAYS, RAY_SPACING, rays_of_camera, visible_fractions
 from ars_web.geometry.shape_stack import kernel_shapes, stack_shapes
 
@@ -46,7 +45,7 @@ def visible_shares(
         raise BadInput(f"the step between rays must be at least 1 pixel, not {step}")
     n, b = len(Ts_world_camera), len(boxes)
     visible, tables = np.empty((n, b)), lens_tables(camera)
-    bend, frustum = frustum_of(camera)
+    radius, bend = reach_of_camera(camera)
     rays = rays_of_camera(camera)
 
     def look(frames: slice) -> None:
@@ -55,7 +54,7 @@ def visible_shares(
             np.array(Ts_world_camera[frames], dtype=np.float64, order="C"),
             tables.lens,
             bend,
-            frustum,
+            radius,
             kernel_shapes(stack),
             stack.parting.copy(),
             NEAR,
@@ -72,13 +71,10 @@ def visible_shares(
 
 
 @lru_cache(maxsize=16)
-def frustum_of(camera: Camera) -> tuple[float, Frustum]:
-    """How much the camera bends straight lines where the kernels ask for it, pixels, and what its image shows."""
-    rays = rays_of_camera(camera)
-    x, y = rays[:, np.isfinite(rays).all(axis=0)]
-    if x.size == 0:
-        return 0.0, Frustum(0.0, 0.0, 0.0, 0.0, 0.0)
-    tables = lens_tables(camera)
-    radius = min(float(np.hypot(x, y).max()), tables.lens.rim / (raster_kernels.MARGIN * (1 + 1e-9)))
-    bend = float(tables.bends_within(np.array([raster_kernels.MARGIN * radius]))[0])
-    return bend, Frustum(radius, *(float(side) for side in (x.min(), x.max(), y.min(), y.max())))
+def reach_of_camera(camera: Camera) -> tuple[float, float]:
+    """The largest radius that the camera's image has on the normalised plane, and how much it bends straight lines up
+    to where the kernels ask for it, as a bound on their second derivative, in pixels."""
+    rays, tables = rays_of_camera(camera), lens_tables(camera)
+    radii = np.hypot(*rays[:, np.isfinite(rays).all(axis=0)])
+    radius = min(float(radii.max(initial=0.0)), tables.lens.rim / (raster_kernels.MARGIN * (1 + 1e-9)))
+    return radius, float(tables.bends_within(np.array([raster_kernels.MARGIN * radius]))[0])
