@@ -65,10 +65,17 @@ class FormatsJson(BaseModel):
 def formats() -> FormatsJson:
     """The formats of recordings and of datasets, with the options of exports in words."""
     options = [OptionJson.model_validate(option, from_attributes=True) for option in export_options()]
+    owned = {name for writer in WRITERS.values() for name in writer.own_options}
     return FormatsJson(
         readers=[ReaderJson(format=r.format, title=r.title, needs=r.needs) for r in READERS.values()],
         writers=[
-            WriterJson(format=w.format, title=w.title, description=w.description, shapes=list(SHAPES), options=options)
+            WriterJson(
+                format=w.format,
+                title=w.title,
+                description=w.description,
+                shapes=list(SHAPES),
+                options=[o for o in options if o.name not in owned or o.name in w.own_options],
+            )
             for w in WRITERS.values()
         ],
     )

@@ -1,6 +1,6 @@
 """The dataset formats by name. Adding one is one file and one line here."""
 
-from ars_web.datasets.writers import ars, coco, voc, yolo, yolo_obb, yolo_pose, yolo_seg
+from ars_web.datasets.writers import ars, coco, compass, voc, yolo, yolo_obb, yolo_pose, yolo_seg
 from ars_web.datasets.writers.writer import Writer
 from ars_web.errors import BadInput
 
@@ -14,6 +14,7 @@ WRITERS: dict[str, Writer] = {
         coco.WRITER,
         voc.WRITER,
         ars.WRITER,
+        compass.WRITER,
     )
 }
 """In the order in which they are offered."""

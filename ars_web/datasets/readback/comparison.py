@@ -20,6 +20,7 @@ from ars_web.errors import BadFile
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box
 from ars_web.geometry.camera import Camera
+from ars_web.geometry.heading import heading_edges
 from ars_web.geometry.rigid_transform import Transform
 
 FRAMES_AT_ONCE = 256
@@ -193,6 +194,9 @@ def _compare_frames(
                     tally.say(f"{place}: the states of {wrong} keypoints differ")
             for error in _errors(selection, i, column, camera, label):
                 tally.measure(error, place)
+            if label.heading is not None:
+                edges = heading_edges(session.boxes[column], plan.classes[session.class_of_box[column]].symmetry)
+                tally.measure(heading_error(camera, selection.shapes.Ts_world_camera[i], label.heading, edges), place)
             if label.rings is not None and rings is not None:
                 tally.measure(_ring_error(label.rings, rings.rings.of(i * wanted.shape[1] + column)), place)
 
@@ -220,6 +224,29 @@ def _errors(selection: Selection, frame: int, column: int, camera: Camera, label
     if label.T_camera_box is not None and label.size is not None:
         read = Box(T_world_camera @ label.T_camera_box, label.size)
         yield pose_error(camera, T_world_camera, read, shapes.boxes[column])
+
+
+def heading_error(
+    camera: Camera,
+    T_world_camera: Transform,
+    read: tuple[float, float],
+    edges: Float[np.ndarray, "m 2 3"],
+) -> float:
+    """By how many pixels the end of a line is off that leaves its start with a heading within those read.
+
+    Of several lines that cannot be told apart any will do. Lines with an end that is not seen are not compared.
+    """
+    if len(edges) == 0:
+        return 0.0 if read[0] == 0.0 else np.inf
+    seen = reprojected(camera, T_world_camera, edges.reshape(-1, 3)).reshape(-1, 2, 2)
+    if np.isnan(seen).any():
+        return 0.0
+    across = seen[:, 1] - seen[:, 0]
+    angle = np.arctan2(across[:, 1], across[:, 0])
+    middle, half = (read[0] + read[1]) / 2, (read[1] - read[0]) / 2
+    off = np.abs((angle - middle + np.pi) % (2 * np.pi) - np.pi)
+    turned = np.clip(off - half, 0.0, None)
+    return float((2 * np.sin(turned / 2) * np.linalg.norm(across, axis=1)).min())
 
 
 def _differing(read: Int[np.ndarray, "k"], true: Int[np.ndarray, "m"]) -> int:
