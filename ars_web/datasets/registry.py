@@ -1,6 +1,6 @@
 """The dataset formats by name. Adding one is one file and one line here."""
 
-from ars_web.datasets.writers import ars, coco, compass, voc, yolo, yolo_obb, yolo_pose, yolo_seg
+from ars_web.datasets.writers import ars, coco, compass, masks, voc, yolo, yolo_obb, yolo_pose, yolo_seg
 from ars_web.datasets.writers.writer import Writer
 from ars_web.errors import BadInput
 
@@ -13,6 +13,7 @@ WRITERS: dict[str, Writer] = {
         yolo_pose.WRITER,
         coco.WRITER,
         voc.WRITER,
+        masks.WRITER,
         ars.WRITER,
         compass.WRITER,
     )

@@ -13,6 +13,7 @@ from jaxtyping import Float, Int
 from ars_web.datasets.counting import Selection, select_labels
 from ars_web.datasets.label_functions import UNSEEN, Marks, label_function
 from ars_web.datasets.planned import ExportPlan
+from ars_web.datasets.readback.mask_comparison import has_mask, masks_of_frame, wrong_pixels
 from ars_web.datasets.readback.reader import ReadFrame, ReadLabel
 from ars_web.datasets.readback.registry import reader_of
 from ars_web.datasets.splits import SPLITS
@@ -45,6 +46,7 @@ class Comparison:
         wrong_classes: labels of another class than planned.
         wrong_splits: frames in another split than planned.
         wrong_states: keypoints that are said to be in sight, hidden or out of the image and are not.
+        wrong_pixels: of masks, that are in one and not in the other.
         largest_error: pixels between what was read and what the session says, of all boxes, rings, points and poses.
         rounding: pixels that the format's own digits may cost.
         where: the place of the largest error; empty where there is none.
@@ -60,6 +62,7 @@ class Comparison:
     wrong_classes: int
     wrong_splits: int
     wrong_states: int
+    wrong_pixels: int
     largest_error: float
     rounding: float
     where: str
@@ -69,7 +72,7 @@ class Comparison:
     def differing(self) -> int:
         """Counts that differ, all together."""
         frames = self.missing_frames + self.unknown_frames + self.wrong_counts + self.wrong_splits
-        return frames + self.wrong_classes + self.wrong_states
+        return frames + self.wrong_classes + self.wrong_states + self.wrong_pixels
 
     @property
     def agrees(self) -> bool:
@@ -89,7 +92,8 @@ class _Tally:
     """What is counted on the way."""
 
     def __init__(self) -> None:
-        self.frames = self.labels = self.unknown = self.counts = self.classes = self.splits = self.states = 0
+        self.frames = self.labels = self.unknown = self.counts = self.classes = self.splits = 0
+        self.states = self.pixels = 0
         self.error, self.where, self.rounding = 0.0, "", 0.0
         self.examples: list[str] = []
 
@@ -141,6 +145,7 @@ def compare(plan: ExportPlan, folder: Path) -> Comparison:
         wrong_classes=tally.classes,
         wrong_splits=tally.splits,
         wrong_states=tally.states,
+        wrong_pixels=tally.pixels,
         largest_error=tally.error,
         rounding=reader.rounding(longest),
         where=tally.where,
@@ -176,6 +181,7 @@ def _compare_frames(
                 frame.place, f"its image is {frame.image_size}, but its camera's are {(camera.width, camera.height)}"
             )
         columns = np.flatnonzero(wanted[i]).tolist()
+        masks = masks_of_frame(selection.shapes, i) if any(has_mask(label) for label in frame.labels) else None
         if len(columns) != len(frame.labels):
             tally.counts += 1
             tally.say(f"{frame.place}: {len(frame.labels)} labels, not {len(columns)}")
@@ -192,6 +198,9 @@ def _compare_frames(
                 tally.states += wrong
                 if wrong:
                     tally.say(f"{place}: the states of {wrong} keypoints differ")
+            if masks is not None and (wrong := wrong_pixels(masks, column, label)):
+                tally.pixels += wrong
+                tally.say(f"{place}: {wrong} pixels differ")
             for error in _errors(selection, i, column, camera, label):
                 tally.measure(error, place)
             if label.heading is not None:

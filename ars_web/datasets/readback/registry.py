@@ -1,6 +1,6 @@
 """How each format is read back. Adding one is one file and one line here."""
 
-from ars_web.datasets.readback import ars, coco, compass, voc, yolo, yolo_obb, yolo_pose, yolo_seg
+from ars_web.datasets.readback import ars, coco, compass, masks, voc, yolo, yolo_obb, yolo_pose, yolo_seg
 from ars_web.datasets.readback.reader import Reader
 from ars_web.errors import BadInput
 
@@ -13,6 +13,7 @@ READERS: dict[str, Reader] = {
         yolo_pose.READER,
         coco.READER,
         voc.READER,
+        masks.READER,
         ars.READER,
         compass.READER,
     )
