@@ -160,6 +160,10 @@ MaxTruncated = Annotated[
 MinArea = Annotated[
     float | None, typer.Option("--min-area-px", metavar="PX", help="Drop labels of smaller area; default 4.")
 ]
+HeadingBins = Annotated[
+    int | None,
+    typer.Option("--heading-bins", metavar="N", help="compass: bins of a turn, 0 for angles; default 18."),
+]
 SplitTrain = Annotated[float | None, typer.Option("--split-train", metavar="SHARE", help="Default 0.8.")]
 SplitVal = Annotated[float | None, typer.Option("--split-val", metavar="SHARE", help="Default 0.2.")]
 SplitTest = Annotated[float | None, typer.Option("--split-test", metavar="SHARE", help="Default 0.")]

@@ -78,6 +78,7 @@ class FormatsJson(BaseModel):
 def formats() -> FormatsJson:
     """The formats of recordings, labels and datasets, with the options of exports in words."""
     options = [OptionJson.model_validate(option, from_attributes=True) for option in export_options()]
+    owned = {name for writer in WRITERS.values() for name in writer.own_options}
     return FormatsJson(
         readers=[ReaderJson(format=r.format, title=r.title, needs=r.needs) for r in READERS.values()],
         labels=[ReaderJson(format=r.format, title=r.title, needs=r.needs) for r in LABEL_READERS.values()],
@@ -88,7 +89,7 @@ def formats() -> FormatsJson:
                 description=w.description,
                 shows=list(w.shows),
                 shapes=list(SHAPES),
-                options=options,
+                options=[o for o in options if o.name not in owned or o.name in w.own_options],
             )
             for w in WRITERS.values()
         ],

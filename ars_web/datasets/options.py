@@ -125,6 +125,14 @@ class ExportOptions(_Strict):
         title="Smallest area",
         description="labels whose box in the image is smaller than so many pixels are dropped",
     )
+    heading_bins: int = Field(
+        18,
+        strict=True,
+        ge=0,
+        le=360,
+        title="Bins of a heading",
+        description="how many bins a turn has where headings are part of the class; 0 writes them as angles",
+    )
     split: SplitChoice = SplitChoice()  # pyright: ignore[reportCallIssue]
     sessions: tuple[str, ...] = Field(
         (),

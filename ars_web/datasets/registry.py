@@ -1,6 +1,19 @@
 """The dataset formats by name. Adding one is one file and one line here."""
 
-from ars_web.datasets.writers import ars, coco, cvat, cvat_video, parquet, voc, yolo, yolo_obb, yolo_pose, yolo_seg
+from ars_web.datasets.writers import (
+    ars,
+    coco,
+    compass,
+    cvat,
+    cvat_video,
+    masks,
+    parquet,
+    voc,
+    yolo,
+    yolo_obb,
+    yolo_pose,
+    yolo_seg,
+)
 from ars_web.datasets.writers.writer import Writer
 from ars_web.errors import BadInput
 
@@ -17,6 +30,8 @@ WRITERS: dict[str, Writer] = {
         cvat.POLYGONS,
         cvat_video.WRITER,
         parquet.WRITER,
+        masks.WRITER,
+        compass.WRITER,
         ars.WRITER,
     )
 }

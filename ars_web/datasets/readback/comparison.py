@@ -13,6 +13,7 @@ from jaxtyping import Float, Int
 from ars_web.datasets.counting import Selection, select_labels
 from ars_web.datasets.label_functions import UNSEEN, Marks, label_function
 from ars_web.datasets.planned import ExportPlan
+from ars_web.datasets.readback.mask_comparison import has_mask, masks_of_frame, wrong_pixels
 from ars_web.datasets.readback.reader import ReadFrame, ReadLabel
 from ars_web.datasets.readback.registry import reader_of
 from ars_web.datasets.splits import SPLITS
@@ -20,6 +21,7 @@ from ars_web.errors import BadFile
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box
 from ars_web.geometry.camera import Camera
+from ars_web.geometry.heading import heading_edges
 from ars_web.geometry.rigid_transform import Transform
 
 FRAMES_AT_ONCE = 256
@@ -44,6 +46,7 @@ class Comparison:
         wrong_classes: labels of another class than planned.
         wrong_splits: frames in another split than planned.
         wrong_states: keypoints that are said to be in sight, hidden or out of the image and are not.
+        wrong_pixels: of masks, that are in one and not in the other.
         largest_error: pixels between what was read and what the session says, of all boxes, rings, points and poses.
         rounding: pixels that the format's own digits may cost.
         where: the place of the largest error; empty where there is none.
@@ -59,6 +62,7 @@ class Comparison:
     wrong_classes: int
     wrong_splits: int
     wrong_states: int
+    wrong_pixels: int
     largest_error: float
     rounding: float
     where: str
@@ -68,7 +72,7 @@ class Comparison:
     def differing(self) -> int:
         """Counts that differ, all together."""
         frames = self.missing_frames + self.unknown_frames + self.wrong_counts + self.wrong_splits
-        return frames + self.wrong_classes + self.wrong_states
+        return frames + self.wrong_classes + self.wrong_states + self.wrong_pixels
 
     @property
     def agrees(self) -> bool:
@@ -88,7 +92,8 @@ class _Tally:
     """What is counted on the way."""
 
     def __init__(self) -> None:
-        self.frames = self.labels = self.unknown = self.counts = self.classes = self.splits = self.states = 0
+        self.frames = self.labels = self.unknown = self.counts = self.classes = self.splits = 0
+        self.states = self.pixels = 0
         self.error, self.where, self.rounding = 0.0, "", 0.0
         self.examples: list[str] = []
 
@@ -140,6 +145,7 @@ def compare(plan: ExportPlan, folder: Path) -> Comparison:
         wrong_classes=tally.classes,
         wrong_splits=tally.splits,
         wrong_states=tally.states,
+        wrong_pixels=tally.pixels,
         largest_error=tally.error,
         rounding=reader.rounding(longest),
         where=tally.where,
@@ -175,6 +181,7 @@ def _compare_frames(
                 frame.place, f"its image is {frame.image_size}, but its camera's are {(camera.width, camera.height)}"
             )
         columns = np.flatnonzero(wanted[i]).tolist()
+        masks = masks_of_frame(selection.shapes, i) if any(has_mask(label) for label in frame.labels) else None
         if len(columns) != len(frame.labels):
             tally.counts += 1
             tally.say(f"{frame.place}: {len(frame.labels)} labels, not {len(columns)}")
@@ -191,8 +198,14 @@ def _compare_frames(
                 tally.states += wrong
                 if wrong:
                     tally.say(f"{place}: the states of {wrong} keypoints differ")
+            if masks is not None and (wrong := wrong_pixels(masks, column, label)):
+                tally.pixels += wrong
+                tally.say(f"{place}: {wrong} pixels differ")
             for error in _errors(selection, i, column, camera, label):
                 tally.measure(error, place)
+            if label.heading is not None:
+                edges = heading_edges(session.boxes[column], plan.classes[session.class_of_box[column]].symmetry)
+                tally.measure(heading_error(camera, selection.shapes.Ts_world_camera[i], label.heading, edges), place)
             if label.rings is not None and rings is not None:
                 tally.measure(_ring_error(label.rings, rings.rings.of(i * wanted.shape[1] + column)), place)
 
@@ -220,6 +233,29 @@ def _errors(selection: Selection, frame: int, column: int, camera: Camera, label
     if label.T_camera_box is not None and label.size is not None:
         read = Box(T_world_camera @ label.T_camera_box, label.size)
         yield pose_error(camera, T_world_camera, read, shapes.boxes[column])
+
+
+def heading_error(
+    camera: Camera,
+    T_world_camera: Transform,
+    read: tuple[float, float],
+    edges: Float[np.ndarray, "m 2 3"],
+) -> float:
+    """By how many pixels the end of a line is off that leaves its start with a heading within those read.
+
+    Of several lines that cannot be told apart any will do. Lines with an end that is not seen are not compared.
+    """
+    if len(edges) == 0:
+        return 0.0 if read[0] == 0.0 else np.inf
+    seen = reprojected(camera, T_world_camera, edges.reshape(-1, 3)).reshape(-1, 2, 2)
+    if np.isnan(seen).any():
+        return 0.0
+    across = seen[:, 1] - seen[:, 0]
+    angle = np.arctan2(across[:, 1], across[:, 0])
+    middle, half = (read[0] + read[1]) / 2, (read[1] - read[0]) / 2
+    off = np.abs((angle - middle + np.pi) % (2 * np.pi) - np.pi)
+    turned = np.clip(off - half, 0.0, None)
+    return float((2 * np.sin(turned / 2) * np.linalg.norm(across, axis=1)).min())
 
 
 def _differing(read: Int[np.ndarray, "k"], true: Int[np.ndarray, "m"]) -> int:

@@ -28,6 +28,7 @@ class ReadLabel:
         rings: of the format's label function, see `Reader.ring_function`.
         points: (k, 2) keypoints, NaN where it holds none.
         states: (k,) of the keypoints, as `label_functions.UNSEEN` and its neighbours number them.
+        heading: from and to, radians, as `geometry/heading.py` has it: a bin, or twice the same.
         T_camera_box: place of the box's centre and its axes before the camera, OpenCV's.
         size: (3,) metres.
         mask, visible_mask: of all of the object in the image, and of what is seen of it.
@@ -40,6 +41,7 @@ class ReadLabel:
     rings: tuple[Float[np.ndarray, "k 2"], ...] | None = None
     points: Float[np.ndarray, "k 2"] | None = None
     states: Int[np.ndarray, "k"] | None = None
+    heading: tuple[float, float] | None = None
     T_camera_box: Transform | None = None
     size: Float[np.ndarray, "3"] | None = None
     mask: ReadMask | None = None

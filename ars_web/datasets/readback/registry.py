@@ -1,6 +1,6 @@
 """How each format is read back. Adding one is one file and one line here."""
 
-from ars_web.datasets.readback import ars, coco, cvat, parquet, voc, yolo, yolo_obb, yolo_pose, yolo_seg
+from ars_web.datasets.readback import ars, coco, compass, cvat, masks, parquet, voc, yolo, yolo_obb, yolo_pose, yolo_seg
 from ars_web.datasets.readback.reader import Reader
 from ars_web.errors import BadInput
 
@@ -17,6 +17,8 @@ READERS: dict[str, Reader] = {
         cvat.POLYGONS,
         cvat.TRACKS,
         parquet.READER,
+        masks.READER,
+        compass.READER,
         ars.READER,
     )
 }

@@ -33,6 +33,7 @@ class Shard:
         sizes: (n, 2) width and height in pixels.
         classes: of the whole dataset; a class's id is its place, from 0.
         class_of_box: (b,) places in `classes`.
+        options: of the export.
         most_boxes: the largest b of all shards: frame number x most_boxes + box number is unique in the dataset.
         shapes: what the labels are drawn round, and the cameras of the images as they are written.
         table: labels of all boxes, those dropped included.
@@ -54,6 +55,7 @@ class Shard:
     sizes: Int[np.ndarray, "n 2"]
     classes: Sequence[PlannedClass]
     class_of_box: Int[np.ndarray, "b"]
+    options: ExportOptions
     most_boxes: int
     shapes: PosedShapes
     table: LabelTable
@@ -119,6 +121,7 @@ class Writer:
         label_functions: those whose marks it writes.
         losses: what of a plan it cannot hold, one line each, told before and after an export; it raises BadInput
             where nothing useful would be left.
+        own_options: the export options that mean something to it alone, or to it and few others.
         with_visible: whether it writes visible fractions.
         with_outlines: whether it writes outlines, each as one ring.
         numbered: files are called by the frame's place in the dataset, five digits, not by the image's name.
@@ -135,6 +138,7 @@ class Writer:
     shows: tuple[str, ...] = ("box",)
     label_functions: tuple[str, ...] = ()
     losses: Callable[[ExportPlan], Sequence[str]] = no_losses
+    own_options: tuple[str, ...] = ()
     with_visible: bool = False
     with_outlines: bool = False
     numbered: bool = False
