@@ -82,7 +82,8 @@ def plan_export(
         stamps=np.zeros((len(picked), 2), dtype=np.int64) if options.images == "none" else _stamps(sources),
         names=tuple(snapshots[number].frames.names[i] for number, i in picked),
         stems=tuple(
-            f"{place:05d}" if writer.numbered else named[number][i] for place, (number, i) in enumerate(picked)
+            f"{place:0{writer.digits}d}" if writer.numbered else named[number][i]
+            for place, (number, i) in enumerate(picked)
         ),
         sources=sources,
     )
