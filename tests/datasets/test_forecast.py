@@ -50,7 +50,7 @@ def test_the_numbers_are_those_of_the_report(
     if found.images.encoded == 0:
         assert found.image_bytes == sum(path.stat().st_size for path in images)
         assert found.new_bytes == sum(path.stat().st_size for path in images if path not in linked)
-    elif options.images == "rectify":
+    elif options.images == "rectify" and not WRITERS[kind].only_png:
         assert found.images.encoded == int((plan.frames.camera_id == 0).sum() + 0)
         assert found.new_bytes == found.image_bytes > 0
 

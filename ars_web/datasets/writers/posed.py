@@ -47,7 +47,7 @@ def lens_losses(plan: ExportPlan, *, exact: str) -> list[str]:
     error, camera_id, session_id = max(errors, key=lambda found: found[0])
     return [
         f"the lens's distortion: poses projected by the camera matrix alone are up to {error:.1f} px off (camera"
-        f" {camera_id} of session {session_id}); {exact}. Export with images: rectify, and nothing is lost"
+        f" {camera_id} of session {session_id}); {exact}. Export with images: rectify to be rid of it"
     ]
 
 
