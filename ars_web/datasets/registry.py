@@ -1,11 +1,12 @@
 """The dataset formats by name. Adding one is one file and one line here."""
 
-from ars_web.datasets.writers import ars, bop, coco, kitti, voc, yolo
+from ars_web.datasets.writers import ars, bop, coco, dope, kitti, voc, yolo
 from ars_web.datasets.writers.writer import Writer
 from ars_web.errors import BadInput
 
 WRITERS: dict[str, Writer] = {
-    writer.format: writer for writer in (yolo.WRITER, coco.WRITER, voc.WRITER, kitti.WRITER, bop.WRITER, ars.WRITER)
+    writer.format: writer
+    for writer in (yolo.WRITER, coco.WRITER, voc.WRITER, kitti.WRITER, bop.WRITER, dope.WRITER, ars.WRITER)
 }
 """In the order in which they are offered."""
 

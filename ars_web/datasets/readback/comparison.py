@@ -204,6 +204,10 @@ def _errors(selection: Selection, frame: int, column: int, camera: Camera, label
         true = reprojected(camera, T_world_camera, shapes.keypoints_world[column])
         held = ~np.isnan(label.points[:, 0])
         yield float(np.abs(label.points - true[: len(held)])[held].max(initial=0.0))
+    if label.corners is not None:
+        true = reprojected(camera, T_world_camera, shapes.boxes[column].corners_world)
+        held = ~np.isnan(label.corners[:, 0])
+        yield float(np.abs(label.corners - true)[held].max(initial=0.0))
     if label.centre_camera is not None:
         centres = np.stack(
             [

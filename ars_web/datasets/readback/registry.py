@@ -1,11 +1,12 @@
 """How each format is read back. Adding one is one file and one line here."""
 
-from ars_web.datasets.readback import ars, bop, coco, kitti, voc, yolo
+from ars_web.datasets.readback import ars, bop, coco, dope, kitti, voc, yolo
 from ars_web.datasets.readback.reader import Reader
 from ars_web.errors import BadInput
 
 READERS: dict[str, Reader] = {
-    reader.format: reader for reader in (yolo.READER, coco.READER, voc.READER, kitti.READER, bop.READER, ars.READER)
+    reader.format: reader
+    for reader in (yolo.READER, coco.READER, voc.READER, kitti.READER, bop.READER, dope.READER, ars.READER)
 }
 """By the format's key in `datasets/registry.py`."""
 

@@ -39,15 +39,19 @@ def write_models(dataset: Dataset, objects: Sequence[BopObject], folder: Path) -
 
 
 def model_info(an_object: BopObject, symmetry: Symmetry) -> dict[str, Any]:
-    """The object's entry in `models_info.json`: its extent and diameter in mm, and its symmetries.
-
-    A symmetry of BOP is a 4 x 4 matrix, row by row, without the identity; all of ours turn about the origin.
-    """
+    """The object's entry in `models_info.json`: its extent and diameter in mm, and its symmetries."""
     points = an_object.vertices_box * _MM
     low, size = points.min(axis=0), np.ptp(points, axis=0)
     found: dict[str, Any] = {"diameter": _rounded(diameter(points))}
     for i, axis in enumerate("xyz"):
         found[f"min_{axis}"], found[f"size_{axis}"] = _rounded(low[i]), _rounded(size[i])
+    return found | symmetry_entries(symmetry)
+
+
+def symmetry_entries(symmetry: Symmetry) -> dict[str, Any]:
+    """What BOP says of a symmetry: 4 x 4 matrices, row by row, without the identity, and axes with a point on them;
+    all of ours turn about the origin."""
+    found: dict[str, Any] = {}
     turns = rotations_of(symmetry)[1:]
     if len(turns):
         matrices = np.tile(np.eye(4), (len(turns), 1, 1))
