@@ -44,7 +44,9 @@ def test_the_numbers_are_those_of_the_report(
     assert (found.splits, found.dropped) == (report.splits, report.dropped)
     assert (found.sessions, found.classes) == (report.sessions, report.classes)
     assert found.frames == sum(split.images for split in report.splits.values()) == len(plan.frames)
-    images = [path for path in plan.out.rglob("*") if path.suffix in (".jpg", ".png")]
+    images = [
+        path for path in plan.out.rglob("*.*") if path.suffix in (".jpg", ".png") and "mask" not in path.parent.name
+    ]
     linked = [path for path in images if path.stat().st_nlink > 1]
     assert (found.images.linked, sum(found.images.model_dump().values())) == (len(linked), len(images))
     if found.images.encoded == 0:

@@ -1,5 +1,5 @@
 """BOP's scene-wise format: `{train,val}/000000/` for each session, with `rgb/`, `scene_camera.json`, `scene_gt.json`
-and `scene_gt_info.json`; `models/`; targets of validation and test images.
+and `scene_gt_info.json`, `mask/` and `mask_visib/`; `models/`; targets of validation and test images.
 
 Millimetres; rotations row by row; a model's origin is its box's centre. Images are numbered through the whole
 dataset. Cameras are matrices alone: what a lens bends is not in them.
@@ -16,6 +16,7 @@ from numba import njit
 
 from ars_web.datasets.planned import ExportPlan
 from ars_web.datasets.writers.bop_info import BopInfo, info_of_outlines
+from ars_web.datasets.writers.bop_masks import write_masks
 from ars_web.datasets.writers.bop_models import write_models
 from ars_web.datasets.writers.bop_objects import object_ids, objects_of
 from ars_web.datasets.writers.digits import Buffer, put_bytes, put_decimal, put_integer, scaled
@@ -218,6 +219,8 @@ def _targets(shard: Shard, rows: Int[np.ndarray, "m"], info: BopInfo, ids: Int[n
 def _write(shard: Shard, files: Path, fragments: Path) -> FileDigests:
     ids = object_ids(objects_of(shard.sessions), shard.session_number, len(shard.shapes.boxes))
     info = info_of_outlines(shard.table, shard.outlines, shard.sizes)
+    if shard.options.masks == "write":
+        info = write_masks(shard, info, files)
     Ts = Ts_camera_box(shard.shapes)
     cameras, of_frame = _cameras(shard), np.array(shard.splits)
     images = shard.first + np.arange(len(of_frame))
@@ -275,6 +278,10 @@ def _camera(dataset: Dataset) -> bytes:
 
 def _losses(plan: ExportPlan) -> list[str]:
     found = lens_losses(plan, exact="the poses themselves, and boxes and counts of pixels, are right")
+    if plan.options.masks == "none":
+        found.append(
+            "masks, which were not asked for; counts of pixels, and what of an object is hidden, are estimates"
+        )
     names = classes_without_boxes(plan)
     if names:
         found.append(f"classes without a box, which have no model: {', '.join(names)}")

@@ -3,12 +3,14 @@
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
+from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from PIL import Image
 
 from ars_web.datasets.jobs import plan_export, run_export
 from ars_web.datasets.options import ExportOptions
@@ -18,9 +20,10 @@ from ars_web.datasets.writers.bop import WRITER
 from ars_web.datasets.writers.bop_info import pixel_box, whole_pixels
 from ars_web.datasets.writers.bop_models import diameter, model_info
 from ars_web.datasets.writers.bop_objects import objects_of
+from ars_web.datasets.writers.mask_png import mask_png
 from ars_web.datasets.writers.posed import lens_error
 from ars_web.geometry.box import Box
-from ars_web.geometry.camera import Camera
+from ars_web.geometry.camera import Camera, normalised_from_pixels
 from ars_web.geometry.symmetry import Symmetry, turn_about
 from ars_web.sessions.hull_mesh import HullMesh
 from ars_web.sessions.model import SessionSnapshot
@@ -29,7 +32,7 @@ Make = Callable[..., SessionSnapshot]
 
 
 @dataclass
-class Image:
+class SceneImage:
     """One image of a scene: its camera, and (object, R_m2c, t_m2c, info) of each label."""
 
     K: np.ndarray
@@ -38,9 +41,9 @@ class Image:
     labels: list[tuple[int, np.ndarray, np.ndarray, dict[str, object]]]
 
 
-def load(folder: Path, split: str) -> dict[tuple[int, int], Image]:
+def load(folder: Path, split: str) -> dict[tuple[int, int], SceneImage]:
     """By scene and image number."""
-    found: dict[tuple[int, int], Image] = {}
+    found: dict[tuple[int, int], SceneImage] = {}
     for scene in sorted((folder / split).iterdir()):
         cameras, gts, infos = (
             json.loads((scene / f"scene_{name}.json").read_bytes()) for name in ("camera", "gt", "gt_info")
@@ -51,7 +54,7 @@ def load(folder: Path, split: str) -> dict[tuple[int, int], Image]:
                 (gt["obj_id"], np.reshape(gt["cam_R_m2c"], (3, 3)), np.array(gt["cam_t_m2c"]), info)
                 for gt, info in zip(gts[number], infos[number], strict=True)
             ]
-            found[int(scene.name), int(number)] = Image(
+            found[int(scene.name), int(number)] = SceneImage(
                 np.reshape(camera["cam_K"], (3, 3)),
                 np.reshape(camera["cam_R_w2c"], (3, 3)),
                 np.array(camera["cam_t_w2c"]),
@@ -71,7 +74,7 @@ def load_ply(path: Path) -> tuple[np.ndarray, np.ndarray]:
 
 
 def written(snapshots: list[SessionSnapshot], out: Path, **changes: object) -> ExportPlan:
-    options = ExportOptions.model_validate({"images": "none", **changes})
+    options = ExportOptions.model_validate({"images": "none", "masks": "none", **changes})
     plan = plan_export(snapshots, format="bop", options=options, out=out, frames_per_shard=5)
     run_export(plan)
     return plan
@@ -262,13 +265,108 @@ def test_scenes_are_sessions_and_images_have_their_numbers(make_snapshot: Make, 
     assert (camera["width"], camera["fx"], camera["depth_scale"]) == (64, 50.0, 1.0)
 
 
+def true_masks(snapshot: SessionSnapshot, frame: int) -> tuple[np.ndarray, np.ndarray]:
+    """(b, h, w) where each box is met by the ray through a pixel's middle, and (h, w) which is met first; the slabs of
+    each box one after the other, for each pixel."""
+    camera = snapshot.cameras[int(snapshot.frames.camera_ids[frame])]
+    columns, rows = np.meshgrid(np.arange(camera.width, dtype=float), np.arange(camera.height, dtype=float))
+    flat = normalised_from_pixels(camera, np.stack([columns, rows], axis=-1))
+    rays = np.concatenate([flat, np.ones((*flat.shape[:2], 1))], axis=-1)
+    entries: list[np.ndarray] = []
+    for box in snapshot.state.boxes.values():
+        T_box_camera = np.linalg.inv(box.box.T_world_box) @ snapshot.frames.Ts_world_camera[frame]
+        directions, start = rays @ T_box_camera[:3, :3].T, T_box_camera[:3, 3]
+        with np.errstate(divide="ignore"):
+            hits = (np.array([-0.5, 0.5])[:, None, None, None] * box.box.size - start) / directions
+        enter, leave = hits.min(axis=0).max(axis=-1), hits.max(axis=0).min(axis=-1)
+        entries.append(np.where((enter < leave) & (leave > 0), np.maximum(enter, 0), np.inf))
+    depths = np.array(entries)
+    return np.isfinite(depths), np.where(np.isfinite(depths).any(axis=0), depths.argmin(axis=0), -1)
+
+
+def test_masks_are_the_pixels_whose_rays_meet_the_object(make_snapshot: Make, tmp_path: Path) -> None:
+    snapshot = make_snapshot(12)
+    plan = written([snapshot], tmp_path / "d", masks="write", min_area_px=40.0)
+    keep, _ = kept(label_table(snapshot, range(12)), plan.options)
+    assert 0 < (~keep[:10]).sum()
+    hidden = compared = 0
+    for split in ("train", "val"):
+        for (scene, number), image in load(tmp_path / "d", split).items():
+            whole, nearest = true_masks(snapshot, number)
+            columns = np.flatnonzero(keep[number]).tolist()
+            names = [f"{number:06d}_{label:06d}.png" for label in range(len(columns))]
+            folder = tmp_path / "d" / split / f"{scene:06d}"
+            assert sorted(path.name for path in folder.glob(f"mask/{number:06d}_*")) == names
+            for (_, _, _, info), column, name in zip(image.labels, columns, names, strict=True):
+                mask, visible = (
+                    cv2.imread(str(folder / kind / name), cv2.IMREAD_UNCHANGED) for kind in ("mask", "mask_visib")
+                )
+                assert (mask.dtype, set(np.unique(mask)) <= {0, 255}) == (np.uint8, True)
+                # A ray through an edge may go either way.
+                assert ((mask > 0) != whole[column]).sum() <= 1
+                assert ((visible > 0) != (nearest == column)).sum() <= 1
+                assert (info["px_count_valid"], info["px_count_visib"]) == ((mask > 0).sum(), (visible > 0).sum())
+                hidden += info["px_count_visib"] < info["px_count_valid"]
+                for key, pixels in (("bbox_obj", mask), ("bbox_visib", visible)):
+                    rows, cols = np.nonzero(pixels)
+                    box = [-1] * 4
+                    if len(rows):
+                        # As misc.calc_2d_bbox of the toolkit.
+                        box = [cols.min(), rows.min(), np.ptp(cols), np.ptp(rows)]
+                    if key == "bbox_visib" or info["px_count_all"] == info["px_count_valid"]:
+                        assert info[key] == box
+                compared += 1
+    assert hidden
+    assert compared > 10
+
+
+def test_silhouettes_beyond_the_image_are_counted(make_snapshot: Make, tmp_path: Path) -> None:
+    snapshot = make_snapshot(12, one_camera=True)
+    written([snapshot], tmp_path / "a", masks="write", split={"train": 1.0, "val": 0.0, "test": 0.0})
+    written([snapshot], tmp_path / "b", split={"train": 1.0, "val": 0.0, "test": 0.0})
+    cut = 0
+    for a, b in zip(*(load(tmp_path / name, "train").values() for name in "ab"), strict=True):
+        for (_, _, _, exact), (_, _, _, estimated) in zip(a.labels, b.labels, strict=True):
+            for key in ("px_count_all", "px_count_valid"):
+                # Of an outline's pixels those at its border may be in or out.
+                assert abs(exact[key] - estimated[key]) <= 2 + 0.3 * estimated[key]
+            if exact["px_count_all"] > exact["px_count_valid"]:
+                x, y, w, h = exact["bbox_obj"]
+                cut += x < 0 or y < 0 or x + w > 63 or y + h > 47
+    assert cut
+
+
+def test_mask_files_are_read_by_others() -> None:
+    random = np.random.default_rng(5)
+    for rows, columns, row, column in ((0, 0, 0, 0), (48, 64, 0, 0), (5, 9, 43, 55), (1, 1, 0, 63), (7, 3, 20, 0)):
+        mask = random.random((rows, columns)) < 0.5
+        expected = np.zeros((48, 64), dtype=np.uint8)
+        expected[row : row + rows, column : column + columns] = mask * 255
+        content = mask_png(mask, row=row, column=column, width=64, height=48)
+        for read in (
+            cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED),
+            np.asarray(Image.open(BytesIO(content))),
+        ):
+            np.testing.assert_array_equal(read, expected)
+        assert Image.open(BytesIO(content)).mode == "L"
+    large = mask_png(np.ones((300, 200), dtype=bool), row=400, column=900, width=1920, height=1080)
+    assert cv2.imdecode(np.frombuffer(large, np.uint8), cv2.IMREAD_UNCHANGED).sum() == 255 * 60_000
+    assert len(large) < 12_000
+
+
+def test_masks_that_are_not_asked_for_are_a_loss(make_snapshot: Make, tmp_path: Path) -> None:
+    options = ExportOptions.model_validate({"images": "rectify", "masks": "none"})
+    plan = plan_export([make_snapshot(2)], format="bop", options=options, out=tmp_path / "d")
+    assert any("masks" in line for line in WRITER.losses(plan))
+
+
 def test_a_lens_is_a_loss_with_its_largest_error(make_snapshot: Make, tmp_path: Path) -> None:
     def losses(images: str) -> list[str]:
         options = ExportOptions.model_validate({"images": images})
         plan = plan_export([make_snapshot(4)], format="bop", options=options, out=tmp_path / "d")
         return list(WRITER.losses(plan))
 
-    (lens, several) = losses("link")
+    lens, several = losses("link")
     assert "camera 0 of session s1" in lens
     assert "images: rectify" in lens
     assert "cube (2)" in several
