@@ -151,6 +151,10 @@ Shape = Annotated[
     Literal["box", "hull", "mesh"] | None,
     typer.Option("--shape", help="What is projected; default: the hull where a box has one, else the box."),
 ]
+Masks = Annotated[
+    Literal["write", "none"] | None,
+    typer.Option("--masks", help="Of bop: two PNG files a label (default), or none, which is much faster."),
+]
 MinVisible = Annotated[
     float | None, typer.Option("--min-visible", metavar="SHARE", help="Drop labels less visible; default 0.")
 ]

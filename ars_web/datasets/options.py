@@ -107,6 +107,15 @@ class ExportOptions(_Strict):
             "x-null-means": "hull",
         },
     )
+    masks: Literal["write", "none"] = Field(
+        "write",
+        title="Masks",
+        description="of formats that hold each label's pixels as images, which BOP scenes do",
+        json_schema_extra=_meanings(
+            write="two PNG files a label: its whole silhouette, and what is seen of it",
+            none="no masks, which is much faster; counts of pixels are estimates from outlines",
+        ),
+    )
     min_visible: Share = Field(
         0.0,
         title="Smallest visible share",

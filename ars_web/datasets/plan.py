@@ -16,7 +16,7 @@ from ars_web.datasets import splits
 from ars_web.datasets.file_names import stems
 from ars_web.datasets.images import source_stamp
 from ars_web.datasets.options import ExportOptions, FrameChoice
-from ars_web.datasets.planned import SECONDS_PER_FRAME, ExportPlan, PlannedClass, PlannedFrames, PlannedSession
+from ars_web.datasets.planned import ExportPlan, PlannedClass, PlannedFrames, PlannedSession, seconds_per_frame
 from ars_web.datasets.registry import writer_of
 from ars_web.datasets.shapes import check_shape, meshes_of, shape_kinds
 from ars_web.errors import BadInput
@@ -80,12 +80,13 @@ def plan_export(
         stamps=np.zeros((len(picked), 2), dtype=np.int64) if options.images == "none" else _stamps(sources),
         names=tuple(snapshots[number].frames.names[i] for number, i in picked),
         stems=tuple(
-            f"{place:05d}" if writer.numbered else named[number][i] for place, (number, i) in enumerate(picked)
+            f"{place:0{writer.digits}d}" if writer.numbered else named[number][i]
+            for place, (number, i) in enumerate(picked)
         ),
         sources=sources,
     )
     most_boxes = max(len(session.boxes) for session in sessions)
-    length = frames_per_shard or _frames_per_shard(len(frames), most_boxes, options.images)
+    length = frames_per_shard or _frames_per_shard(len(frames), most_boxes, seconds_per_frame(format, options))
     plan = ExportPlan(out, format, options, classes, sessions, frames, _shards(counts, length))
     # A format that can hold nothing useful of it, or not be written here, says so now and not when all is done.
     writer.losses(plan)
@@ -177,8 +178,7 @@ def _stamps(sources: Sequence[str]) -> Int[np.ndarray, "n 2"]:
     return stamps
 
 
-def _frames_per_shard(frames: int, most_boxes: int, images: str) -> int:
-    cost = SECONDS_PER_FRAME[images]
+def _frames_per_shard(frames: int, most_boxes: int, cost: float) -> int:
     longest = min(SHARD_SECONDS / cost, SHARD_BOX_FRAMES / max(most_boxes, 1))
     if frames * cost > 2.0:
         longest = min(longest, frames / FEWEST_SHARDS)

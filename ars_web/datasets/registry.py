@@ -2,10 +2,13 @@
 
 from ars_web.datasets.writers import (
     ars,
+    bop,
     coco,
     compass,
     cvat,
     cvat_video,
+    dope,
+    kitti,
     masks,
     parquet,
     voc,
@@ -26,6 +29,9 @@ WRITERS: dict[str, Writer] = {
         yolo_pose.WRITER,
         coco.WRITER,
         voc.WRITER,
+        kitti.WRITER,
+        bop.WRITER,
+        dope.WRITER,
         cvat.WRITER,
         cvat.POLYGONS,
         cvat_video.WRITER,

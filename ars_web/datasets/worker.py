@@ -145,14 +145,20 @@ def _shard(plan: ExportPlan, number: int, images: Path) -> tuple[Shard, dict[str
     )
     splits = [SPLITS[i] for i in frames.split[start:stop].tolist()]
     sources, stems = frames.sources[start:stop], frames.stems[start:stop]
-    names = [image_name(stem, source, only_jpeg=writer.only_jpeg) for stem, source in zip(stems, sources, strict=True)]
+    names = [
+        image_name(stem, source, only_jpeg=writer.only_jpeg, only_png=writer.only_png)
+        for stem, source in zip(stems, sources, strict=True)
+    ]
     has_images = plan.options.images != "none"
-    files = [images / _image_folder(writer, split) / name for split, name in zip(splits, names, strict=True)]
+    folders = {split: images / _image_folder(writer, split, session_number) for split in set(splits)}
+    files = [folders[split] / name for split, name in zip(splits, names, strict=True)]
     return (
         Shard(
             first=start,
             session_number=session_number,
             session=session,
+            sessions=plan.sessions,
+            options=plan.options,
             splits=splits,
             stems=stems,
             image_names=names,
@@ -175,9 +181,9 @@ def _shard(plan: ExportPlan, number: int, images: Path) -> tuple[Shard, dict[str
     )
 
 
-def _image_folder(writer: Writer, split: str) -> str:
+def _image_folder(writer: Writer, split: str, session: int) -> str:
     """Where images of a split lie below the folder of all files, or of those that are put into others."""
-    return split if writer.image_folder is None else writer.image_folder(split)
+    return split if writer.image_folder is None else writer.image_folder(split).format(session=session)
 
 
 def identity(name: str, source: str) -> str:

@@ -18,12 +18,13 @@ def given(name: str, value: object) -> dict[str, Any]:
 
 def test_every_option_is_there_but_those_that_leave_no_choice() -> None:
     assert list(OPTIONS) == [
-        "frames.step", "frames.start", "frames.stop", "frames.list", "images", "shape", "min_visible",
+        "frames.step", "frames.start", "frames.stop", "frames.list", "images", "shape", "masks", "min_visible",
         "max_truncated", "min_area_px", "heading_bins", "split.train", "split.val", "split.test", "split.by",
         "split.seed", "sessions",
     ]  # fmt: skip
     assert {name: option.type for name, option in OPTIONS.items() if option.type not in ("integer", "number")} == {
-        "frames.list": "integers", "images": "choice", "shape": "choice", "split.by": "choice", "sessions": "texts",
+        "frames.list": "integers", "images": "choice", "shape": "choice", "masks": "choice", "split.by": "choice",
+        "sessions": "texts",
     }  # fmt: skip
 
 

@@ -138,7 +138,7 @@ def test_folders_in_use_are_refused(make_snapshot: Make, tmp_path: Path) -> None
 
 def test_unknown_formats_and_meshes_are_refused(make_snapshot: Make, tmp_path: Path) -> None:
     snapshot = make_snapshot(1)
-    with pytest.raises(BadInput, match="'nope' is unknown; known are yolo, coco, voc, ars"):
+    with pytest.raises(BadInput, match="'nope' is unknown; known are yolo, coco, voc, kitti, bop, dope, ars"):
         plan_of(snapshot, out=tmp_path / "d", format="nope")
     with pytest.raises(BadInput, match="mesh"):
         plan_of(snapshot, out=tmp_path / "d", shape="mesh")

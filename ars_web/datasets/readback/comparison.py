@@ -230,6 +230,20 @@ def _errors(selection: Selection, frame: int, column: int, camera: Camera, label
         true[: len(known)] = known
         held = ~np.isnan(label.points[:, 0])
         yield float(np.abs(label.points - true)[held].max(initial=0.0))
+    if label.corners is not None:
+        true = reprojected(camera, T_world_camera, shapes.boxes[column].corners_world)
+        held = ~np.isnan(label.corners[:, 0])
+        yield float(np.abs(label.corners - true)[held].max(initial=0.0))
+    if label.centre_camera is not None:
+        centres = np.stack(
+            [
+                T_world_camera[:3, :3] @ label.centre_camera + T_world_camera[:3, 3],
+                shapes.boxes[column].T_world_box[:3, 3],
+            ]
+        )
+        read, true = reprojected(camera, T_world_camera, centres)
+        if not np.isnan(true).any():
+            yield float(np.abs(read - true).max())
     if label.T_camera_box is not None and label.size is not None:
         read = Box(T_world_camera @ label.T_camera_box, label.size)
         yield pose_error(camera, T_world_camera, read, shapes.boxes[column])

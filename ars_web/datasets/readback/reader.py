@@ -31,6 +31,8 @@ class ReadLabel:
         heading: from and to, radians, as `geometry/heading.py` has it: a bin, or twice the same.
         T_camera_box: place of the box's centre and its axes before the camera, OpenCV's.
         size: (3,) metres.
+        corners: (8, 2) of the box in the order of `box.CORNER_SIGNS`, NaN where it holds none.
+        centre_camera: (3,) place of the box's centre alone, of formats that hold no more of its pose.
         mask, visible_mask: of all of the object in the image, and of what is seen of it.
         visible, truncated: shares.
     """
@@ -44,6 +46,8 @@ class ReadLabel:
     heading: tuple[float, float] | None = None
     T_camera_box: Transform | None = None
     size: Float[np.ndarray, "3"] | None = None
+    corners: Float[np.ndarray, "8 2"] | None = None
+    centre_camera: Float[np.ndarray, "3"] | None = None
     mask: ReadMask | None = None
     visible_mask: ReadMask | None = None
     visible: float | None = None

@@ -1,6 +1,21 @@
 """How each format is read back. Adding one is one file and one line here."""
 
-from ars_web.datasets.readback import ars, coco, compass, cvat, masks, parquet, voc, yolo, yolo_obb, yolo_pose, yolo_seg
+from ars_web.datasets.readback import (
+    ars,
+    bop,
+    coco,
+    compass,
+    cvat,
+    dope,
+    kitti,
+    masks,
+    parquet,
+    voc,
+    yolo,
+    yolo_obb,
+    yolo_pose,
+    yolo_seg,
+)
 from ars_web.datasets.readback.reader import Reader
 from ars_web.errors import BadInput
 
@@ -13,6 +28,9 @@ READERS: dict[str, Reader] = {
         yolo_pose.READER,
         coco.READER,
         voc.READER,
+        kitti.READER,
+        bop.READER,
+        dope.READER,
         cvat.READER,
         cvat.POLYGONS,
         cvat.TRACKS,

@@ -22,6 +22,8 @@ class Shard:
         first: place of its first frame in the dataset, from 0.
         session_number: place of its session in the dataset, from 0.
         session: what the plan knows of it, box names and ids included.
+        sessions: all of the dataset's, for ids that span them.
+        options: of the export.
         splits: of each frame, `train`, `val` or `test`.
         stems: of each frame's files.
         image_names: of each frame's image file, in the folder that the writer's `image_folder` says.
@@ -45,6 +47,8 @@ class Shard:
     first: int
     session_number: int
     session: PlannedSession
+    sessions: Sequence[PlannedSession]
+    options: ExportOptions
     splits: Sequence[str]
     stems: Sequence[str]
     image_names: Sequence[str]
@@ -111,8 +115,9 @@ class Writer:
         title: its name for people.
         description: what it is for, and what it holds, in one line.
         label_folder: every file below it is a label file, and `dataset.json`'s sha256 is over those; or the one
-            label file.
-        image_folder: from a split to the folder of its images; None: their bytes are in the files that it writes.
+            label file; or a shell's pattern of those files where others lie beside them.
+        image_folder: from a split to the folder of its images, `{session:06d}` in it standing for the place of their
+            session; None: their bytes are in the files that it writes.
         write: writes a shard's label files below the folder `files`, which becomes part of the dataset, and what
             is to be joined below `fragments`; returns the digests of the label files in `files`.
         join: from the shards' `fragments` folders, in order, writes the files that span shards into the dataset;
@@ -124,8 +129,9 @@ class Writer:
         own_options: the export options that mean something to it alone, or to it and few others.
         with_visible: whether it writes visible fractions.
         with_outlines: whether it writes outlines, each as one ring.
-        numbered: files are called by the frame's place in the dataset, five digits, not by the image's name.
-        only_jpeg: other images are encoded as JPEG.
+        numbered: files are called by the frame's place in the dataset, not by the image's name.
+        digits: of those numbers.
+        only_jpeg, only_png: other images are encoded as JPEG, or as PNG.
     """
 
     format: str
@@ -142,4 +148,6 @@ class Writer:
     with_visible: bool = False
     with_outlines: bool = False
     numbered: bool = False
+    digits: int = 5
     only_jpeg: bool = False
+    only_png: bool = False

@@ -6,6 +6,7 @@ Where a format changes on purpose, write the files anew from the folder that the
 from collections.abc import Callable
 from pathlib import Path
 
+import cv2
 import pytest
 
 from ars_web import __version__
@@ -33,10 +34,14 @@ def test_files_are_the_golden_ones(make_snapshot: Callable[..., SessionSnapshot]
 
 
 def _contents(folder: Path) -> dict[str, str]:
-    """Every file's text by its path; of files that are no text, the bytes in Python's notation."""
+    """Every file's text by its path; of images the pixels, which encoders may pack as they like; of other files that
+    are no text, the bytes in Python's notation."""
     found: dict[str, str] = {}
     for path in sorted(path for path in folder.rglob("*") if path.is_file()):
         content = path.read_bytes()
+        if path.suffix == ".png":
+            found[str(path.relative_to(folder))] = repr(cv2.imread(str(path), cv2.IMREAD_UNCHANGED).tolist())
+            continue
         try:
             found[str(path.relative_to(folder))] = content.decode()
         except UnicodeDecodeError:
