@@ -169,7 +169,6 @@ def _shard(plan: ExportPlan, number: int, images: Path) -> tuple[Shard, dict[str
             sizes=sizes,
             classes=plan.classes,
             class_of_box=np.array(session.class_of_box, dtype=np.int64),
-            options=plan.options,
             most_boxes=max(len(s.boxes) for s in plan.sessions),
             shapes=shapes,
             table=selection.table,
