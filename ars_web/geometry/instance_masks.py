@@ -15,7 +15,7 @@ from ars_web.geometry.labels import NEAR
 from ars_web.geometry.lens import lens_tables
 from ars_web.geometry.mesh import Mesh
 from ars_web.geometry.rigid_transform import Transform
-from ars_web.geometry.shape_occlusion import reach_of_camera
+from ars_web.geometry.shape_occlusion import view_of
 from ars_web.geometry.shape_stack import kernel_shapes, stack_shapes
 
 TILE = 48
@@ -69,11 +69,10 @@ def instance_masks(
         BadInput: there are not as many meshes as boxes.
     """
     shapes = _shapes(tuple(boxes), tuple(meshes))
-    radius, bend = reach_of_camera(camera)
     visible, crops = np.empty((camera.height, camera.width), np.int16), np.empty((len(boxes), 4), np.int64)
     T = np.array(T_world_camera, dtype=np.float64, order="C")
     pixels = raster_kernels.instances(
-        T, lens_tables(camera).lens, bend, radius, shapes, NEAR, rays_of_pixels(camera), TILE, visible, crops
+        T, lens_tables(camera).lens, view_of(camera), shapes, NEAR, rays_of_pixels(camera), TILE, visible, crops
     )
     parts = np.split(pixels, np.cumsum(crops[:, 2] * crops[:, 3])[:-1]) if len(boxes) else []
     silhouettes = [

@@ -90,6 +90,23 @@ class Placed(NamedTuple):
     front: Array
 
 
+class View(NamedTuple):
+    """What a camera shows of the normalised plane.
+
+    Attributes:
+        limit: the square of the radius up to which points are said to have an image: MARGIN times the image's own.
+        bend: bound, up to there, on the second derivative of a straight line's image, in pixels.
+        low_x, high_x, low_y, high_y: bounds on the image's rays.
+    """
+
+    limit: float
+    bend: float
+    low_x: float
+    high_x: float
+    low_y: float
+    high_y: float
+
+
 class Grid(NamedTuple):
     """Rays row by row, at the image points (u + j du, v + i dv)."""
 
@@ -221,33 +238,60 @@ def place_shape(T_world_camera: Array, shapes: Shapes, b: int, near: float, with
 
 
 @part
-def place_images(lens: Lens, limit: float, bend: float, shapes: Shapes, b: int, placed: Placed) -> None:
-    """What `draw` needs of a shape that is placed; vertices are said to have an image up to a radius whose square is
-    `limit`, and to there `bend` bounds the second derivative of a straight line's image, in pixels."""
-    points, image, nearness = placed.points, placed.image, placed.nearness
+def beside(
+    P: Array, i: int, j: int, m: int, near: float, low_x: float, high_x: float, low_y: float, high_y: float
+) -> bool:
+    """Whether no ray within these bounds meets a triangle of three vertices beyond the near plane, because all three
+    are on one side of the rays; some may be behind the camera."""
+    return (
+        max(P[2, i], max(P[2, j], P[2, m])) < near
+        or min(P[0, i] - high_x * P[2, i], min(P[0, j] - high_x * P[2, j], P[0, m] - high_x * P[2, m])) > 0.0
+        or max(P[0, i] - low_x * P[2, i], max(P[0, j] - low_x * P[2, j], P[0, m] - low_x * P[2, m])) < 0.0
+        or min(P[1, i] - high_y * P[2, i], min(P[1, j] - high_y * P[2, j], P[1, m] - high_y * P[2, m])) > 0.0
+        or max(P[1, i] - low_y * P[2, i], max(P[1, j] - low_y * P[2, j], P[1, m] - low_y * P[2, m])) < 0.0
+    )
+
+
+@part
+def place_images(lens: Lens, view: View, near: float, shapes: Shapes, b: int, placed: Placed) -> None:
+    """What `draw` needs of a shape that is placed: where in the image its faces may be met."""
+    points, image, nearness, faces, limit = placed.points, placed.image, placed.nearness, shapes.faces, view.limit
     for i in range(shapes.first_vertex[b], shapes.first_vertex[b + 1]):
         inverse = 1.0 / max(points[2, i], AHEAD)
         x, y = points[0, i] * inverse, points[1, i] * inverse
         u, v = image_point(lens, x, y)
         image[0, i] = u if (points[2, i] > AHEAD) & (x * x + y * y < limit) else np.nan
         image[1, i], nearness[i] = v, inverse * inverse
-    first, listed, outside = shapes.first_face[b], placed.listed, placed.kinds[b] == OUTSIDE
-    n = first
-    for f in range(first, shapes.first_face[b + 1]):
-        # A closed surface is first met from outside.
-        listed[n] = f
-        n += 1 if not outside or placed.front[f] else 0
-    placed.counts[b] = n - first
     # On the normalised plane a side is as long as in space times sqrt(1 + r^2) / z, at most.
-    place_faces(shapes.faces, shapes.sides, 0.125 * bend * (1.0 + limit), first, n, placed)
+    bend, outside = 0.125 * view.bend * (1.0 + limit), placed.kinds[b] == OUTSIDE
+    listed, reach, n = placed.listed, placed.reach, shapes.first_face[b]
+    for f in range(shapes.first_face[b], shapes.first_face[b + 1]):
+        # A closed surface is first met from outside.
+        if outside and not placed.front[f]:
+            continue
+        i, j, m = faces[0, f], faces[1, f], faces[2, f]
+        ui, uj, um, vi, vj, vm = image[0, i], image[0, j], image[0, m], image[1, i], image[1, j], image[1, m]
+        off = bend * shapes.sides[f] * max(nearness[i], max(nearness[j], nearness[m])) + SLACK
+        listed[n], reach[4, n] = f, off
+        if math.isnan(ui + uj + um):
+            if beside(points, i, j, m, near, view.low_x, view.high_x, view.low_y, view.high_y):
+                continue
+            reach[0, n], reach[1, n], reach[2, n], reach[3, n] = -np.inf, np.inf, -np.inf, np.inf
+        else:
+            reach[0, n], reach[1, n] = min(ui, min(uj, um)) - off, max(ui, max(uj, um)) + off
+            reach[2, n], reach[3, n] = min(vi, min(vj, vm)) - off, max(vi, max(vj, vm)) + off
+            if reach[0, n] > lens.width or reach[1, n] < 0.0 or reach[2, n] > lens.height or reach[3, n] < 0.0:
+                continue
+        n += 1
+    placed.counts[b] = n - shapes.first_face[b]
 
 
 @part
 def contour(
     lens: Lens, limit: float, bend: float, shapes: Shapes, b: int, placed: Placed, pieces: Array, k: int
 ) -> tuple[Array, int]:
-    """Append the images (4,) from (u, v) to (u, v) of the edges between what of a shape is turned to the camera and what
-    is not to `pieces` after the first k; k itself where one of them is beyond `limit`.
+    """Append the images, (u, v) to (u, v), of the edges between what of a shape is turned to the camera and what is not
+    to `pieces` (k, 4) after the first k; none where one of them is beyond `limit`.
 
     The sum of the edges' turns round a ray is how often the ray enters the shape (contour_kernels.py).
     """
@@ -305,26 +349,6 @@ def cover(pieces: Array, start: int, end: int, grid: Grid, turns: Array, covered
         for j in range(columns):
             sum_ += turns[i * wide + j]
             covered[i * columns + j] |= sum_ != 0
-
-
-@part
-def place_faces(
-    faces: Array, sides: Array, bend: float, first: int, end: int, placed: Placed
-) -> None:
-    """Where in the image the listed faces from `first` to `end` may be met; `bend`: pixels by which the image of a side
-    is off its chord, for the square of its length a metre before the camera."""
-    image, nearness, listed, reach = placed.image, placed.nearness, placed.listed, placed.reach
-    for k in range(first, end):
-        f = listed[k]
-        a, b, c = faces[0, f], faces[1, f], faces[2, f]
-        off = bend * sides[f] * max(nearness[a], max(nearness[b], nearness[c])) + SLACK
-        ua, ub, uc, va, vb, vc = image[0, a], image[0, b], image[0, c], image[1, a], image[1, b], image[1, c]
-        known = ua + ub + uc == ua + ub + uc
-        reach[0, k] = min(ua, min(ub, uc)) - off if known else -np.inf
-        reach[1, k] = max(ua, max(ub, uc)) + off if known else np.inf
-        reach[2, k] = min(va, min(vb, vc)) - off if known else -np.inf
-        reach[3, k] = max(va, max(vb, vc)) + off if known else np.inf
-        reach[4, k] = off
 
 
 @part
@@ -392,17 +416,6 @@ def draw(
         xi, yi, zi = P[0, i], P[1, i], P[2, i]
         xj, yj, zj = P[0, j], P[1, j], P[2, j]
         xm, ym, zm = P[0, m], P[1, m], P[2, m]
-        if reach[1, k] == np.inf:
-            if low_x == -np.inf:
-                low_x, high_x, low_y, high_y = bounds_of_rays(xs, ys, rows * columns)
-            if (
-                max(zi, max(zj, zm)) < near
-                or min(xi - high_x * zi, min(xj - high_x * zj, xm - high_x * zm)) > 0.0
-                or max(xi - low_x * zi, max(xj - low_x * zj, xm - low_x * zm)) < 0.0
-                or min(yi - high_y * zi, min(yj - high_y * zj, ym - high_y * zm)) > 0.0
-                or max(yi - low_y * zi, max(yj - low_y * zj, ym - low_y * zm)) < 0.0
-            ):
-                continue
         # Of two triangles with a side in common each ray beside it is in one: what is told of the side by one is what
         # is told by the other with the sign turned, to the last bit.
         ax, ay, az = yi * zj - zi * yj, zi * xj - xi * zj, xi * yj - yi * xj
@@ -415,6 +428,16 @@ def draw(
             ax, ay, az, bx, by, bz, cx, cy, cz = -ax, -ay, -az, -bx, -by, -bz, -cx, -cy, -cz
             volume = -volume
         scale = 1.0 / volume
+        if reach[1, k] == np.inf:
+            if low_x == -np.inf:
+                low_x, high_x, low_y, high_y = bounds_of_rays(xs, ys, rows * columns)
+            # Nothing but the bounds of the rays tells that none of them is within the triangle.
+            if (
+                max(ax * low_x, ax * high_x) + max(ay * low_y, ay * high_y) + az < 0.0
+                or max(bx * low_x, bx * high_x) + max(by * low_y, by * high_y) + bz < 0.0
+                or max(cx * low_x, cx * high_x) + max(cy * low_y, cy * high_y) + cz < 0.0
+            ):
+                continue
         # A long thin triangle fills little of its box: within it, each side bounds the columns of a row.
         narrow = end_column - first_column > FEW and end_row > first_row + 1 and reach[1, k] != np.inf
         if narrow:
@@ -503,8 +526,7 @@ def cast_grid(
 def visible_shares(
     Ts_world_camera: Array,
     lens: Lens,
-    bend: float,
-    radius: float,
+    view: View,
     shapes: Shapes,
     parting: Array,
     near: float,
@@ -520,7 +542,7 @@ def visible_shares(
 
     Where a plane tells that one shape is before the other, only the other's contour is looked at.
     """
-    boxes, limit = len(shapes.halves), (MARGIN * radius) ** 2
+    boxes = len(shapes.halves)
     placed = room(shapes)
     depth, sides, others = np.empty((boxes, 2)), np.empty((boxes, boxes), np.int64), np.empty(boxes, np.int64)
     within = np.empty(boxes, np.bool_)
@@ -556,7 +578,7 @@ def visible_shares(
                     place_shape(T, shapes, c, near, within[c], placed)
                     starts[c], is_placed[c] = used, True
                     if placed.kinds[c] == OUTSIDE:
-                        pieces, used = contour(lens, limit, bend, shapes, c, placed, pieces, used)
+                        pieces, used = contour(lens, view.limit, view.bend, shapes, c, placed, pieces, used)
                     ends[c] = used
             by_depth = ends[b] == starts[b]
             for k in range(n):
@@ -567,7 +589,7 @@ def visible_shares(
                 for k in range(n + 1):
                     c = others[k] if k < n else b
                     if not has_images[c] and (k == n or not parted[k]):
-                        place_images(lens, limit, bend, shapes, c, placed)
+                        place_images(lens, view, near, shapes, c, placed)
                         has_images[c] = True
             for finer in (1, 4):
                 rows = max(math.ceil((v1 - v0) * finer / step), fewest)
@@ -612,8 +634,7 @@ def visible_shares(
 def instances(
     T_world_camera: Array,
     lens: Lens,
-    bend: float,
-    radius: float,
+    view: View,
     shapes: Shapes,
     near: float,
     rays: Array,
@@ -627,7 +648,7 @@ def instances(
 
     `rays` (2, h, w) are those of the pixels' middles. Pixels are looked at in tiles of `tile` x `tile`.
     """
-    boxes, limit, (height, width) = len(shapes.halves), (MARGIN * radius) ** 2, visible.shape
+    boxes, (height, width) = len(shapes.halves), visible.shape
     placed, depth, within = room(shapes), np.empty((boxes, 2)), np.empty(boxes, np.bool_)
     place_bounds(T_world_camera, shapes, depth, within)
     xs, ys, drawn = np.empty(tile * tile), np.empty(tile * tile), np.empty(tile * tile)
@@ -639,7 +660,7 @@ def instances(
         if depth[b, 1] < near:
             continue
         place_shape(T_world_camera, shapes, b, near, within[b], placed)
-        place_images(lens, limit, bend, shapes, b, placed)
+        place_images(lens, view, near, shapes, b, placed)
         first = shapes.first_face[b]
         u0, u1, v0, v1 = np.inf, -np.inf, np.inf, -np.inf
         for k in range(first, first + placed.counts[b]):
