@@ -352,6 +352,60 @@ def cover(pieces: Array, start: int, end: int, grid: Grid, turns: Array, covered
 
 
 @part
+def sides_of(P: Array, i: int, j: int, m: int, sides: Array) -> float:
+    """The planes (3, 3) through the camera and a triangle's sides: sides[s] . (x, y, 1) is at least 0 for all three
+    where the ray or its opposite meets the triangle. Their sum over the answer's size is the inverse depth; the answer is
+    below 0 where the triangle is turned to the camera.
+
+    Of two triangles with a side in common each ray beside it is in one: what is told of the side by one is what is told
+    by the other with the sign turned, to the last bit.
+    """
+    xi, yi, zi = P[0, i], P[1, i], P[2, i]
+    xj, yj, zj = P[0, j], P[1, j], P[2, j]
+    xm, ym, zm = P[0, m], P[1, m], P[2, m]
+    sides[0, 0], sides[0, 1], sides[0, 2] = yi * zj - zi * yj, zi * xj - xi * zj, xi * yj - yi * xj
+    sides[1, 0], sides[1, 1], sides[1, 2] = yj * zm - zj * ym, zj * xm - xj * zm, xj * ym - yj * xm
+    sides[2, 0], sides[2, 1], sides[2, 2] = ym * zi - zm * yi, zm * xi - xm * zi, xm * yi - ym * xi
+    volume = xi * sides[1, 0] + yi * sides[1, 1] + zi * sides[1, 2]
+    if volume < 0.0:
+        for s in range(3):
+            sides[s, 0], sides[s, 1], sides[s, 2] = -sides[s, 0], -sides[s, 1], -sides[s, 2]
+    return volume
+
+
+@part
+def misses(sides: Array, low_x: float, high_x: float, low_y: float, high_y: float) -> bool:
+    """Whether all rays within these bounds are beyond one of a triangle's sides."""
+    for s in range(3):
+        a, b = sides[s, 0], sides[s, 1]
+        if max(a * low_x, a * high_x) + max(b * low_y, b * high_y) + sides[s, 2] < 0.0:
+            return True
+    return False
+
+
+@part
+def touch(shapes: Shapes, placed: Placed, b: int, tile: int, bounds: Array, touched: Array) -> None:
+    """Mark the tiles of an image that a shape may be in; `bounds` (4, k, l) are those of the rays of each."""
+    faces, reach, sides = shapes.faces, placed.reach, np.empty((3, 3))
+    down, across = touched.shape
+    touched[:] = False
+    for k in range(shapes.first_face[b], shapes.first_face[b] + placed.counts[b]):
+        if reach[1, k] == np.inf:
+            f = placed.listed[k]
+            if sides_of(placed.points, faces[0, f], faces[1, f], faces[2, f], sides) != 0.0:
+                for i in range(down):
+                    for j in range(across):
+                        hit = not misses(sides, bounds[0, i, j], bounds[1, i, j], bounds[2, i, j], bounds[3, i, j])
+                        touched[i, j] |= hit
+            continue
+        top, end_row = int(max(reach[2, k], 0.0)) // tile, int(max(reach[3, k], 0.0)) // tile + 1
+        left, end_column = int(max(reach[0, k], 0.0)) // tile, int(max(reach[1, k], 0.0)) // tile + 1
+        for i in range(top, min(end_row, down)):
+            for j in range(left, min(end_column, across)):
+                touched[i, j] = True
+
+
+@part
 def trim(image: Array, i: int, j: int, m: int, off: float, grid: Grid, bounds: Array) -> None:
     """Between which columns of a row may be what is `off` pixels at most from the triangle of three vertices' images:
     for each of its sides from bounds[0] + bounds[1] row to bounds[2] + bounds[3] row."""
@@ -397,8 +451,8 @@ def draw(
 ) -> None:
     """Raise the inverse depths `drawn` of a grid's rays to those at which they meet a shape's listed faces beyond the
     near plane: from outside where `side` is 1, from inside where it is -1, either where it is 0."""
-    P, image, faces, reach = placed.points, placed.image, shapes.faces, placed.reach
-    bounds = np.empty((3, 4))
+    image, faces, reach = placed.image, shapes.faces, placed.reach
+    sides, bounds = np.empty((3, 3)), np.empty((3, 4))
     furthest, rows, columns = 1.0 / near, grid.rows, grid.columns
     u, v, by_du, by_dv = grid.u, grid.v, 1.0 / grid.du, 1.0 / grid.dv
     last_row, last_column = rows - 1.0, columns - 1.0
@@ -413,30 +467,18 @@ def draw(
             continue
         f = placed.listed[k]
         i, j, m = faces[0, f], faces[1, f], faces[2, f]
-        xi, yi, zi = P[0, i], P[1, i], P[2, i]
-        xj, yj, zj = P[0, j], P[1, j], P[2, j]
-        xm, ym, zm = P[0, m], P[1, m], P[2, m]
-        # Of two triangles with a side in common each ray beside it is in one: what is told of the side by one is what
-        # is told by the other with the sign turned, to the last bit.
-        ax, ay, az = yi * zj - zi * yj, zi * xj - xi * zj, xi * yj - yi * xj
-        bx, by, bz = yj * zm - zj * ym, zj * xm - xj * zm, xj * ym - yj * xm
-        cx, cy, cz = ym * zi - zm * yi, zm * xi - xm * zi, xm * yi - ym * xi
-        volume = xi * bx + yi * by + zi * bz
+        volume = sides_of(placed.points, i, j, m, sides)
         if volume * side > 0.0 or volume == 0.0:
             continue
-        if volume < 0.0:
-            ax, ay, az, bx, by, bz, cx, cy, cz = -ax, -ay, -az, -bx, -by, -bz, -cx, -cy, -cz
-            volume = -volume
-        scale = 1.0 / volume
+        ax, ay, az = sides[0, 0], sides[0, 1], sides[0, 2]
+        bx, by, bz = sides[1, 0], sides[1, 1], sides[1, 2]
+        cx, cy, cz = sides[2, 0], sides[2, 1], sides[2, 2]
+        scale = 1.0 / abs(volume)
         if reach[1, k] == np.inf:
             if low_x == -np.inf:
                 low_x, high_x, low_y, high_y = bounds_of_rays(xs, ys, rows * columns)
             # Nothing but the bounds of the rays tells that none of them is within the triangle.
-            if (
-                max(ax * low_x, ax * high_x) + max(ay * low_y, ay * high_y) + az < 0.0
-                or max(bx * low_x, bx * high_x) + max(by * low_y, by * high_y) + bz < 0.0
-                or max(cx * low_x, cx * high_x) + max(cy * low_y, cy * high_y) + cz < 0.0
-            ):
+            if misses(sides, low_x, high_x, low_y, high_y):
                 continue
         # A long thin triangle fills little of its box: within it, each side bounds the columns of a row.
         narrow = end_column - first_column > FEW and end_row > first_row + 1 and reach[1, k] != np.inf
@@ -452,12 +494,15 @@ def draw(
                 if low > high:
                     continue
                 start, end = row * columns + math.ceil(low), row * columns + math.floor(high) + 1
-            for ray in range(start, end):
-                x, y = xs[ray], ys[ray]
+            some_x, some_y, some = xs[start:end], ys[start:end], drawn[start:end]
+            # Counted from 0, and no branch on a ray: only then does the processor take several at a time.
+            for ray in range(len(some)):
+                x, y = some_x[ray], some_y[ray]
                 past_a, past_b, past_c = ax * x + ay * y + az, bx * x + by * y + bz, cx * x + cy * y + cz
                 met = (past_a + past_b + past_c) * scale
-                hit = (past_a >= 0.0) & (past_b >= 0.0) & (past_c >= 0.0) & (met <= furthest) & (met > drawn[ray])
-                drawn[ray] = met if hit else drawn[ray]
+                least = min(past_a, min(past_b, past_c))
+                met = met if (least >= 0.0) & (met <= furthest) else 0.0
+                some[ray] = max(met, some[ray])
 
 
 @part
@@ -638,6 +683,7 @@ def instances(
     shapes: Shapes,
     near: float,
     rays: Array,
+    bounds: Array,
     tile: int,
     visible: Array,
     crops: Array,
@@ -646,7 +692,8 @@ def instances(
     shape's silhouette is, written to `crops` (b, 4): first row, first column, rows and columns; answered are the
     silhouettes' pixels, one after the other, row by row.
 
-    `rays` (2, h, w) are those of the pixels' middles. Pixels are looked at in tiles of `tile` x `tile`.
+    `rays` (2, h, w) are those of the pixels' middles. Pixels are looked at in tiles of `tile` x `tile`, whose rays are
+    within `bounds` (4, k, l): the least and largest x, and the least and largest y.
     """
     boxes, (height, width) = len(shapes.halves), visible.shape
     placed, depth, within = room(shapes), np.empty((boxes, 2)), np.empty(boxes, np.bool_)
@@ -654,6 +701,7 @@ def instances(
     xs, ys, drawn = np.empty(tile * tile), np.empty(tile * tile), np.empty(tile * tile)
     nearest, layer = np.zeros((height, width)), np.zeros((height, width))
     pixels, used = np.empty(height * width, np.bool_), 0
+    touched = np.empty(bounds.shape[1:], np.bool_)
     visible[:] = -1
     for b in range(boxes):
         crops[b] = 0
@@ -661,19 +709,13 @@ def instances(
             continue
         place_shape(T_world_camera, shapes, b, near, within[b], placed)
         place_images(lens, view, near, shapes, b, placed)
-        first = shapes.first_face[b]
-        u0, u1, v0, v1 = np.inf, -np.inf, np.inf, -np.inf
-        for k in range(first, first + placed.counts[b]):
-            u0, u1 = min(u0, placed.reach[0, k]), max(u1, placed.reach[1, k])
-            v0, v1 = min(v0, placed.reach[2, k]), max(v1, placed.reach[3, k])
-        if not (u0 < width and v0 < height and u1 > 0.0 and v1 > 0.0):
-            continue
-        left, top = int(max(u0, 0.0)), int(max(v0, 0.0))
-        right, bottom = int(min(math.ceil(min(u1, 1e9)), width)), int(min(math.ceil(min(v1, 1e9)), height))
+        touch(shapes, placed, b, tile, bounds, touched)
         low_row, low_column, high_row, high_column = height, width, -1, -1
-        for row in range(top, bottom, tile):
-            for column in range(left, right, tile):
-                rows, columns = min(tile, bottom - row), min(tile, right - column)
+        for row in range(0, height, tile):
+            for column in range(0, width, tile):
+                if not touched[row // tile, column // tile]:
+                    continue
+                rows, columns = min(tile, height - row), min(tile, width - column)
                 for i in range(rows):
                     for j in range(columns):
                         ray = i * columns + j
@@ -698,7 +740,8 @@ def instances(
             pixels = more
         for i in range(low_row, high_row + 1):
             for j in range(low_column, high_column + 1):
-                met, other = layer[i, j], visible[i, j]
+                met = layer[i, j] if touched[i // tile, j // tile] else 0.0
+                other = visible[i, j]
                 pixels[used] = met > 0.0
                 used += 1
                 # A shape round the camera hides nothing: all others are before it.
