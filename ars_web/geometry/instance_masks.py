@@ -15,11 +15,14 @@ from ars_web.geometry.labels import NEAR
 from ars_web.geometry.lens import lens_tables
 from ars_web.geometry.mesh import Mesh
 from ars_web.geometry.rigid_transform import Transform
-from ars_web.geometry.shape_occlusion import reach_of_camera
+from ars_web.geometry.shape_occlusion import view_of
 from ars_web.geometry.shape_stack import kernel_shapes, stack_shapes
 
 TILE = 48
 """Pixels along the sides of the squares that are drawn at once: their depths stay in the processor's cache."""
+
+EDGES: tuple[tuple[np.ufunc, float], ...] = ((np.minimum, np.inf), (np.maximum, -np.inf))
+"""How the least and the largest of rays are found, and what stands for a ray that there is not."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,12 +72,10 @@ def instance_masks(
         BadInput: there are not as many meshes as boxes.
     """
     shapes = _shapes(tuple(boxes), tuple(meshes))
-    radius, bend = reach_of_camera(camera)
     visible, crops = np.empty((camera.height, camera.width), np.int16), np.empty((len(boxes), 4), np.int64)
     T = np.array(T_world_camera, dtype=np.float64, order="C")
-    pixels = raster_kernels.instances(
-        T, lens_tables(camera).lens, bend, radius, shapes, NEAR, rays_of_pixels(camera), TILE, visible, crops
-    )
+    lens, (rays, bounds) = lens_tables(camera).lens, rays_of_pixels(camera)
+    pixels = raster_kernels.instances(T, lens, view_of(camera), shapes, NEAR, rays, bounds, TILE, visible, crops)
     parts = np.split(pixels, np.cumsum(crops[:, 2] * crops[:, 3])[:-1]) if len(boxes) else []
     silhouettes = [
         Silhouette(row, column, part.reshape(rows, columns))
@@ -89,9 +90,18 @@ def _shapes(boxes: tuple[Box, ...], meshes: tuple[Mesh | None, ...]) -> raster_k
 
 
 @lru_cache(maxsize=2)
-def rays_of_pixels(camera: Camera) -> Float[np.ndarray, "2 h w"]:
-    """Points of the normalised plane at the pixels' middles, NaN beyond the lens's valid radius; kept for the next
-    frame."""
+def rays_of_pixels(camera: Camera) -> tuple[Float[np.ndarray, "2 h w"], Float[np.ndarray, "4 k l"]]:
+    """Points of the normalised plane at the pixels' middles, NaN beyond the lens's valid radius, and for each tile of
+    them the least and largest x, and the least and largest y; kept for the next frame."""
     rows, columns = np.mgrid[: camera.height, : camera.width]
     rays = cameras.normalised_from_pixels(camera, np.stack([columns, rows], axis=-1).astype(np.float64))
-    return np.ascontiguousarray(np.moveaxis(rays, -1, 0))
+    rays = np.ascontiguousarray(np.moveaxis(rays, -1, 0))
+    low, high = (_over_tiles(edge, np.where(np.isnan(rays), empty, rays)) for edge, empty in EDGES)
+    return rays, np.ascontiguousarray(np.stack([low[0], high[0], low[1], high[1]]))
+
+
+def _over_tiles(edge: np.ufunc, rays: Float[np.ndarray, "2 h w"]) -> Float[np.ndarray, "2 k l"]:
+    """The least or the largest of each tile."""
+    _, height, width = rays.shape
+    rows = edge.reduceat(rays, np.arange(0, height, TILE), axis=1)
+    return edge.reduceat(rows, np.arange(0, width, TILE), axis=2)

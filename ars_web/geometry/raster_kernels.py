@@ -90,6 +90,23 @@ class Placed(NamedTuple):
     front: Array
 
 
+class View(NamedTuple):
+    """What a camera shows of the normalised plane.
+
+    Attributes:
+        limit: the square of the radius up to which points are said to have an image: MARGIN times the image's own.
+        bend: bound, up to there, on the second derivative of a straight line's image, in pixels.
+        low_x, high_x, low_y, high_y: bounds on the image's rays.
+    """
+
+    limit: float
+    bend: float
+    low_x: float
+    high_x: float
+    low_y: float
+    high_y: float
+
+
 class Grid(NamedTuple):
     """Rays row by row, at the image points (u + j du, v + i dv)."""
 
@@ -221,33 +238,60 @@ def place_shape(T_world_camera: Array, shapes: Shapes, b: int, near: float, with
 
 
 @part
-def place_images(lens: Lens, limit: float, bend: float, shapes: Shapes, b: int, placed: Placed) -> None:
-    """What `draw` needs of a shape that is placed; vertices are said to have an image up to a radius whose square is
-    `limit`, and to there `bend` bounds the second derivative of a straight line's image, in pixels."""
-    points, image, nearness = placed.points, placed.image, placed.nearness
+def beside(
+    P: Array, i: int, j: int, m: int, near: float, low_x: float, high_x: float, low_y: float, high_y: float
+) -> bool:
+    """Whether no ray within these bounds meets a triangle of three vertices beyond the near plane, because all three
+    are on one side of the rays; some may be behind the camera."""
+    return (
+        max(P[2, i], max(P[2, j], P[2, m])) < near
+        or min(P[0, i] - high_x * P[2, i], min(P[0, j] - high_x * P[2, j], P[0, m] - high_x * P[2, m])) > 0.0
+        or max(P[0, i] - low_x * P[2, i], max(P[0, j] - low_x * P[2, j], P[0, m] - low_x * P[2, m])) < 0.0
+        or min(P[1, i] - high_y * P[2, i], min(P[1, j] - high_y * P[2, j], P[1, m] - high_y * P[2, m])) > 0.0
+        or max(P[1, i] - low_y * P[2, i], max(P[1, j] - low_y * P[2, j], P[1, m] - low_y * P[2, m])) < 0.0
+    )
+
+
+@part
+def place_images(lens: Lens, view: View, near: float, shapes: Shapes, b: int, placed: Placed) -> None:
+    """What `draw` needs of a shape that is placed: where in the image its faces may be met."""
+    points, image, nearness, faces, limit = placed.points, placed.image, placed.nearness, shapes.faces, view.limit
     for i in range(shapes.first_vertex[b], shapes.first_vertex[b + 1]):
         inverse = 1.0 / max(points[2, i], AHEAD)
         x, y = points[0, i] * inverse, points[1, i] * inverse
         u, v = image_point(lens, x, y)
         image[0, i] = u if (points[2, i] > AHEAD) & (x * x + y * y < limit) else np.nan
         image[1, i], nearness[i] = v, inverse * inverse
-    first, listed, outside = shapes.first_face[b], placed.listed, placed.kinds[b] == OUTSIDE
-    n = first
-    for f in range(first, shapes.first_face[b + 1]):
-        # A closed surface is first met from outside.
-        listed[n] = f
-        n += 1 if not outside or placed.front[f] else 0
-    placed.counts[b] = n - first
     # On the normalised plane a side is as long as in space times sqrt(1 + r^2) / z, at most.
-    place_faces(shapes.faces, shapes.sides, 0.125 * bend * (1.0 + limit), first, n, placed)
+    bend, outside = 0.125 * view.bend * (1.0 + limit), placed.kinds[b] == OUTSIDE
+    listed, reach, n = placed.listed, placed.reach, shapes.first_face[b]
+    for f in range(shapes.first_face[b], shapes.first_face[b + 1]):
+        # A closed surface is first met from outside.
+        if outside and not placed.front[f]:
+            continue
+        i, j, m = faces[0, f], faces[1, f], faces[2, f]
+        ui, uj, um, vi, vj, vm = image[0, i], image[0, j], image[0, m], image[1, i], image[1, j], image[1, m]
+        off = bend * shapes.sides[f] * max(nearness[i], max(nearness[j], nearness[m])) + SLACK
+        listed[n], reach[4, n] = f, off
+        if math.isnan(ui + uj + um):
+            if beside(points, i, j, m, near, view.low_x, view.high_x, view.low_y, view.high_y):
+                continue
+            reach[0, n], reach[1, n], reach[2, n], reach[3, n] = -np.inf, np.inf, -np.inf, np.inf
+        else:
+            reach[0, n], reach[1, n] = min(ui, min(uj, um)) - off, max(ui, max(uj, um)) + off
+            reach[2, n], reach[3, n] = min(vi, min(vj, vm)) - off, max(vi, max(vj, vm)) + off
+            if reach[0, n] > lens.width or reach[1, n] < 0.0 or reach[2, n] > lens.height or reach[3, n] < 0.0:
+                continue
+        n += 1
+    placed.counts[b] = n - shapes.first_face[b]
 
 
 @part
 def contour(
     lens: Lens, limit: float, bend: float, shapes: Shapes, b: int, placed: Placed, pieces: Array, k: int
 ) -> tuple[Array, int]:
-    """Append the images (4,) from (u, v) to (u, v) of the edges between what of a shape is turned to the camera and what
-    is not to `pieces` after the first k; k itself where one of them is beyond `limit`.
+    """Append the images, (u, v) to (u, v), of the edges between what of a shape is turned to the camera and what is not
+    to `pieces` (k, 4) after the first k; none where one of them is beyond `limit`.
 
     The sum of the edges' turns round a ray is how often the ray enters the shape (contour_kernels.py).
     """
@@ -308,21 +352,57 @@ def cover(pieces: Array, start: int, end: int, grid: Grid, turns: Array, covered
 
 
 @part
-def place_faces(faces: Array, sides: Array, bend: float, first: int, end: int, placed: Placed) -> None:
-    """Where in the image the listed faces from `first` to `end` may be met; `bend`: pixels by which the image of a side
-    is off its chord, for the square of its length a metre before the camera."""
-    image, nearness, listed, reach = placed.image, placed.nearness, placed.listed, placed.reach
-    for k in range(first, end):
-        f = listed[k]
-        a, b, c = faces[0, f], faces[1, f], faces[2, f]
-        off = bend * sides[f] * max(nearness[a], max(nearness[b], nearness[c])) + SLACK
-        ua, ub, uc, va, vb, vc = image[0, a], image[0, b], image[0, c], image[1, a], image[1, b], image[1, c]
-        known = ua + ub + uc == ua + ub + uc
-        reach[0, k] = min(ua, min(ub, uc)) - off if known else -np.inf
-        reach[1, k] = max(ua, max(ub, uc)) + off if known else np.inf
-        reach[2, k] = min(va, min(vb, vc)) - off if known else -np.inf
-        reach[3, k] = max(va, max(vb, vc)) + off if known else np.inf
-        reach[4, k] = off
+def sides_of(P: Array, i: int, j: int, m: int, sides: Array) -> float:
+    """The planes (3, 3) through the camera and a triangle's sides: sides[s] . (x, y, 1) is at least 0 for all three
+    where the ray or its opposite meets the triangle. Their sum over the answer's size is the inverse depth; the answer is
+    below 0 where the triangle is turned to the camera.
+
+    Of two triangles with a side in common each ray beside it is in one: what is told of the side by one is what is told
+    by the other with the sign turned, to the last bit.
+    """
+    xi, yi, zi = P[0, i], P[1, i], P[2, i]
+    xj, yj, zj = P[0, j], P[1, j], P[2, j]
+    xm, ym, zm = P[0, m], P[1, m], P[2, m]
+    sides[0, 0], sides[0, 1], sides[0, 2] = yi * zj - zi * yj, zi * xj - xi * zj, xi * yj - yi * xj
+    sides[1, 0], sides[1, 1], sides[1, 2] = yj * zm - zj * ym, zj * xm - xj * zm, xj * ym - yj * xm
+    sides[2, 0], sides[2, 1], sides[2, 2] = ym * zi - zm * yi, zm * xi - xm * zi, xm * yi - ym * xi
+    volume = xi * sides[1, 0] + yi * sides[1, 1] + zi * sides[1, 2]
+    if volume < 0.0:
+        for s in range(3):
+            sides[s, 0], sides[s, 1], sides[s, 2] = -sides[s, 0], -sides[s, 1], -sides[s, 2]
+    return volume
+
+
+@part
+def misses(sides: Array, low_x: float, high_x: float, low_y: float, high_y: float) -> bool:
+    """Whether all rays within these bounds are beyond one of a triangle's sides."""
+    for s in range(3):
+        a, b = sides[s, 0], sides[s, 1]
+        if max(a * low_x, a * high_x) + max(b * low_y, b * high_y) + sides[s, 2] < 0.0:
+            return True
+    return False
+
+
+@part
+def touch(shapes: Shapes, placed: Placed, b: int, tile: int, bounds: Array, touched: Array) -> None:
+    """Mark the tiles of an image that a shape may be in; `bounds` (4, k, l) are those of the rays of each."""
+    faces, reach, sides = shapes.faces, placed.reach, np.empty((3, 3))
+    down, across = touched.shape
+    touched[:] = False
+    for k in range(shapes.first_face[b], shapes.first_face[b] + placed.counts[b]):
+        if reach[1, k] == np.inf:
+            f = placed.listed[k]
+            if sides_of(placed.points, faces[0, f], faces[1, f], faces[2, f], sides) != 0.0:
+                for i in range(down):
+                    for j in range(across):
+                        hit = not misses(sides, bounds[0, i, j], bounds[1, i, j], bounds[2, i, j], bounds[3, i, j])
+                        touched[i, j] |= hit
+            continue
+        top, end_row = int(max(reach[2, k], 0.0)) // tile, int(max(reach[3, k], 0.0)) // tile + 1
+        left, end_column = int(max(reach[0, k], 0.0)) // tile, int(max(reach[1, k], 0.0)) // tile + 1
+        for i in range(top, min(end_row, down)):
+            for j in range(left, min(end_column, across)):
+                touched[i, j] = True
 
 
 @part
@@ -371,8 +451,8 @@ def draw(
 ) -> None:
     """Raise the inverse depths `drawn` of a grid's rays to those at which they meet a shape's listed faces beyond the
     near plane: from outside where `side` is 1, from inside where it is -1, either where it is 0."""
-    P, image, faces, reach = placed.points, placed.image, shapes.faces, placed.reach
-    bounds = np.empty((3, 4))
+    image, faces, reach = placed.image, shapes.faces, placed.reach
+    sides, bounds = np.empty((3, 3)), np.empty((3, 4))
     furthest, rows, columns = 1.0 / near, grid.rows, grid.columns
     u, v, by_du, by_dv = grid.u, grid.v, 1.0 / grid.du, 1.0 / grid.dv
     last_row, last_column = rows - 1.0, columns - 1.0
@@ -387,32 +467,19 @@ def draw(
             continue
         f = placed.listed[k]
         i, j, m = faces[0, f], faces[1, f], faces[2, f]
-        xi, yi, zi = P[0, i], P[1, i], P[2, i]
-        xj, yj, zj = P[0, j], P[1, j], P[2, j]
-        xm, ym, zm = P[0, m], P[1, m], P[2, m]
+        volume = sides_of(placed.points, i, j, m, sides)
+        if volume * side > 0.0 or volume == 0.0:
+            continue
+        ax, ay, az = sides[0, 0], sides[0, 1], sides[0, 2]
+        bx, by, bz = sides[1, 0], sides[1, 1], sides[1, 2]
+        cx, cy, cz = sides[2, 0], sides[2, 1], sides[2, 2]
+        scale = 1.0 / abs(volume)
         if reach[1, k] == np.inf:
             if low_x == -np.inf:
                 low_x, high_x, low_y, high_y = bounds_of_rays(xs, ys, rows * columns)
-            if (
-                max(zi, max(zj, zm)) < near
-                or min(xi - high_x * zi, min(xj - high_x * zj, xm - high_x * zm)) > 0.0
-                or max(xi - low_x * zi, max(xj - low_x * zj, xm - low_x * zm)) < 0.0
-                or min(yi - high_y * zi, min(yj - high_y * zj, ym - high_y * zm)) > 0.0
-                or max(yi - low_y * zi, max(yj - low_y * zj, ym - low_y * zm)) < 0.0
-            ):
+            # Nothing but the bounds of the rays tells that none of them is within the triangle.
+            if misses(sides, low_x, high_x, low_y, high_y):
                 continue
-        # Of two triangles with a side in common each ray beside it is in one: what is told of the side by one is what
-        # is told by the other with the sign turned, to the last bit.
-        ax, ay, az = yi * zj - zi * yj, zi * xj - xi * zj, xi * yj - yi * xj
-        bx, by, bz = yj * zm - zj * ym, zj * xm - xj * zm, xj * ym - yj * xm
-        cx, cy, cz = ym * zi - zm * yi, zm * xi - xm * zi, xm * yi - ym * xi
-        volume = xi * bx + yi * by + zi * bz
-        if volume * side > 0.0 or volume == 0.0:
-            continue
-        if volume < 0.0:
-            ax, ay, az, bx, by, bz, cx, cy, cz = -ax, -ay, -az, -bx, -by, -bz, -cx, -cy, -cz
-            volume = -volume
-        scale = 1.0 / volume
         # A long thin triangle fills little of its box: within it, each side bounds the columns of a row.
         narrow = end_column - first_column > FEW and end_row > first_row + 1 and reach[1, k] != np.inf
         if narrow:
@@ -427,12 +494,15 @@ def draw(
                 if low > high:
                     continue
                 start, end = row * columns + math.ceil(low), row * columns + math.floor(high) + 1
-            for ray in range(start, end):
-                x, y = xs[ray], ys[ray]
+            some_x, some_y, some = xs[start:end], ys[start:end], drawn[start:end]
+            # Counted from 0, and no branch on a ray: only then does the processor take several at a time.
+            for ray in range(len(some)):
+                x, y = some_x[ray], some_y[ray]
                 past_a, past_b, past_c = ax * x + ay * y + az, bx * x + by * y + bz, cx * x + cy * y + cz
                 met = (past_a + past_b + past_c) * scale
-                hit = (past_a >= 0.0) & (past_b >= 0.0) & (past_c >= 0.0) & (met <= furthest) & (met > drawn[ray])
-                drawn[ray] = met if hit else drawn[ray]
+                least = min(past_a, min(past_b, past_c))
+                met = met if (least >= 0.0) & (met <= furthest) else 0.0
+                some[ray] = max(met, some[ray])
 
 
 @part
@@ -501,8 +571,7 @@ def cast_grid(
 def visible_shares(
     Ts_world_camera: Array,
     lens: Lens,
-    bend: float,
-    radius: float,
+    view: View,
     shapes: Shapes,
     parting: Array,
     near: float,
@@ -518,7 +587,7 @@ def visible_shares(
 
     Where a plane tells that one shape is before the other, only the other's contour is looked at.
     """
-    boxes, limit = len(shapes.halves), (MARGIN * radius) ** 2
+    boxes = len(shapes.halves)
     placed = room(shapes)
     depth, sides, others = np.empty((boxes, 2)), np.empty((boxes, boxes), np.int64), np.empty(boxes, np.int64)
     within = np.empty(boxes, np.bool_)
@@ -554,7 +623,7 @@ def visible_shares(
                     place_shape(T, shapes, c, near, within[c], placed)
                     starts[c], is_placed[c] = used, True
                     if placed.kinds[c] == OUTSIDE:
-                        pieces, used = contour(lens, limit, bend, shapes, c, placed, pieces, used)
+                        pieces, used = contour(lens, view.limit, view.bend, shapes, c, placed, pieces, used)
                     ends[c] = used
             by_depth = ends[b] == starts[b]
             for k in range(n):
@@ -565,7 +634,7 @@ def visible_shares(
                 for k in range(n + 1):
                     c = others[k] if k < n else b
                     if not has_images[c] and (k == n or not parted[k]):
-                        place_images(lens, limit, bend, shapes, c, placed)
+                        place_images(lens, view, near, shapes, c, placed)
                         has_images[c] = True
             for finer in (1, 4):
                 rows = max(math.ceil((v1 - v0) * finer / step), fewest)
@@ -610,11 +679,11 @@ def visible_shares(
 def instances(
     T_world_camera: Array,
     lens: Lens,
-    bend: float,
-    radius: float,
+    view: View,
     shapes: Shapes,
     near: float,
     rays: Array,
+    bounds: Array,
     tile: int,
     visible: Array,
     crops: Array,
@@ -623,34 +692,30 @@ def instances(
     shape's silhouette is, written to `crops` (b, 4): first row, first column, rows and columns; answered are the
     silhouettes' pixels, one after the other, row by row.
 
-    `rays` (2, h, w) are those of the pixels' middles. Pixels are looked at in tiles of `tile` x `tile`.
+    `rays` (2, h, w) are those of the pixels' middles. Pixels are looked at in tiles of `tile` x `tile`, whose rays are
+    within `bounds` (4, k, l): the least and largest x, and the least and largest y.
     """
-    boxes, limit, (height, width) = len(shapes.halves), (MARGIN * radius) ** 2, visible.shape
+    boxes, (height, width) = len(shapes.halves), visible.shape
     placed, depth, within = room(shapes), np.empty((boxes, 2)), np.empty(boxes, np.bool_)
     place_bounds(T_world_camera, shapes, depth, within)
     xs, ys, drawn = np.empty(tile * tile), np.empty(tile * tile), np.empty(tile * tile)
     nearest, layer = np.zeros((height, width)), np.zeros((height, width))
     pixels, used = np.empty(height * width, np.bool_), 0
+    touched = np.empty(bounds.shape[1:], np.bool_)
     visible[:] = -1
     for b in range(boxes):
         crops[b] = 0
         if depth[b, 1] < near:
             continue
         place_shape(T_world_camera, shapes, b, near, within[b], placed)
-        place_images(lens, limit, bend, shapes, b, placed)
-        first = shapes.first_face[b]
-        u0, u1, v0, v1 = np.inf, -np.inf, np.inf, -np.inf
-        for k in range(first, first + placed.counts[b]):
-            u0, u1 = min(u0, placed.reach[0, k]), max(u1, placed.reach[1, k])
-            v0, v1 = min(v0, placed.reach[2, k]), max(v1, placed.reach[3, k])
-        if not (u0 < width and v0 < height and u1 > 0.0 and v1 > 0.0):
-            continue
-        left, top = int(max(u0, 0.0)), int(max(v0, 0.0))
-        right, bottom = int(min(math.ceil(min(u1, 1e9)), width)), int(min(math.ceil(min(v1, 1e9)), height))
+        place_images(lens, view, near, shapes, b, placed)
+        touch(shapes, placed, b, tile, bounds, touched)
         low_row, low_column, high_row, high_column = height, width, -1, -1
-        for row in range(top, bottom, tile):
-            for column in range(left, right, tile):
-                rows, columns = min(tile, bottom - row), min(tile, right - column)
+        for row in range(0, height, tile):
+            for column in range(0, width, tile):
+                if not touched[row // tile, column // tile]:
+                    continue
+                rows, columns = min(tile, height - row), min(tile, width - column)
                 for i in range(rows):
                     for j in range(columns):
                         ray = i * columns + j
@@ -675,7 +740,8 @@ def instances(
             pixels = more
         for i in range(low_row, high_row + 1):
             for j in range(low_column, high_column + 1):
-                met, other = layer[i, j], visible[i, j]
+                met = layer[i, j] if touched[i // tile, j // tile] else 0.0
+                other = visible[i, j]
                 pixels[used] = met > 0.0
                 used += 1
                 # A shape round the camera hides nothing: all others are before it.

@@ -15,6 +15,7 @@ from ars_web.geometry.labels import NEAR
 from ars_web.geometry.lens import lens_tables
 from ars_web.geometry.mesh import Mesh
 from ars_web.geometry.occlusion import BLOCK, FEWEST_RAYS, RAY_SPACING, rays_of_camera, visible_fractions
+from ars_web.geometry.raster_kernels import View
 from ars_web.geometry.shape_stack import kernel_shapes, stack_shapes
 
 
@@ -45,7 +46,6 @@ def visible_shares(
         raise BadInput(f"the step between rays must be at least 1 pixel, not {step}")
     n, b = len(Ts_world_camera), len(boxes)
     visible, tables = np.empty((n, b)), lens_tables(camera)
-    radius, bend = reach_of_camera(camera)
     rays = rays_of_camera(camera)
 
     def look(frames: slice) -> None:
@@ -53,8 +53,7 @@ def visible_shares(
         raster_kernels.visible_shares(
             np.array(Ts_world_camera[frames], dtype=np.float64, order="C"),
             tables.lens,
-            bend,
-            radius,
+            view_of(camera),
             kernel_shapes(stack),
             stack.parting.copy(),
             NEAR,
@@ -71,10 +70,14 @@ def visible_shares(
 
 
 @lru_cache(maxsize=16)
-def reach_of_camera(camera: Camera) -> tuple[float, float]:
-    """The largest radius that the camera's image has on the normalised plane, and how much it bends straight lines up
-    to where the kernels ask for it, as a bound on their second derivative, in pixels."""
+def view_of(camera: Camera) -> View:
+    """What the camera shows of the normalised plane, as the kernels read it; kept for the next call."""
     rays, tables = rays_of_camera(camera), lens_tables(camera)
-    radii = np.hypot(*rays[:, np.isfinite(rays).all(axis=0)])
-    radius = min(float(radii.max(initial=0.0)), tables.lens.rim / (raster_kernels.MARGIN * (1 + 1e-9)))
-    return radius, float(tables.bends_within(np.array([raster_kernels.MARGIN * radius]))[0])
+    x, y = rays[:, np.isfinite(rays).all(axis=0)]
+    radius = float(np.hypot(x, y).max(initial=0.0))
+    limit = min(raster_kernels.MARGIN * radius, (1 - 1e-9) * tables.lens.rim)
+    # Between the rays there are others that go a little further.
+    more = 0.05 * radius
+    bounds = (x.min(initial=0.0), x.max(initial=0.0), y.min(initial=0.0), y.max(initial=0.0))
+    sides = (float(side) + sign * more for side, sign in zip(bounds, (-1, 1, -1, 1), strict=True))
+    return View(limit**2, float(tables.bends_within(np.array([limit]))[0]), *sides)

@@ -51,8 +51,8 @@ class ShapeStack:
 
     @cached_property
     def parting(self) -> Float[np.ndarray, "b b 4"]:
-        """For each shape and each other one a plane (nx, ny, nz, d) with all of the first on or below it, n . p + d <= 0,
-        and all of the other on or above it; NaN where none of the directions that are tried has one.
+        """For each shape and each other one a plane (nx, ny, nz, d) with all of the first on or below it,
+        n . p + d <= 0, and all of the other on or above it; NaN where none of the directions that are tried has one.
 
         Tried are the axes of the bounds, the lines between their centres, and DIRECTIONS all round.
         """
@@ -105,7 +105,7 @@ def _stack(boxes: tuple[Box, ...], meshes: tuple[Mesh | None, ...]) -> ShapeStac
     edges = [np.zeros((0, 4), np.int64)]
     for solid, vertex, face in zip(solids, first_vertex[:-1].tolist(), first_face[:-1].tolist(), strict=True):
         faces.append(solid.faces + vertex)
-        edges.append(solid.edges + [vertex, vertex, face, face])
+        edges.append(solid.edges + np.array([vertex, vertex, face, face]))
     Ts_world_bound, halves = np.empty((len(boxes), 4, 4)), np.empty((len(boxes), 3))
     for i, (box, solid) in enumerate(zip(boxes, solids, strict=True)):
         inside = rigid_transform.transform_points(rigid_transform.invert(box.T_world_box), solid.vertices_world)
