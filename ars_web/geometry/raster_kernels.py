@@ -308,9 +308,7 @@ def cover(pieces: Array, start: int, end: int, grid: Grid, turns: Array, covered
 
 
 @part
-def place_faces(
-    faces: Array, sides: Array, bend: float, first: int, end: int, placed: Placed
-) -> None:
+def place_faces(faces: Array, sides: Array, bend: float, first: int, end: int, placed: Placed) -> None:
     """Where in the image the listed faces from `first` to `end` may be met; `bend`: pixels by which the image of a side
     is off its chord, for the square of its length a metre before the camera."""
     image, nearness, listed, reach = placed.image, placed.nearness, placed.listed, placed.reach
