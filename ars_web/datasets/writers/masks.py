@@ -28,26 +28,26 @@ MOST_CLASSES = 255
 LARGEST_BOX_ID = 65535
 
 _PNG = [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE]
-"""Runs alone are looked for: masks are little else, and it is a quarter of the work."""
+"""Runs alone are looked for: masks are little else, and such files are half as large."""
 
 
 def instance_ids(
     masks: InstanceMasks, keep: Bool[np.ndarray, "b"], box_ids: Sequence[int]
 ) -> UInt16[np.ndarray, "h w"]:
     """The id of the box that is seen at each pixel, 0 where none is or its label is not kept."""
-    return _values(keep, box_ids)[masks.visible + 1].astype(np.uint16)
+    return _values(keep, box_ids).astype(np.uint16)[masks.visible]
 
 
 def class_values(
     masks: InstanceMasks, keep: Bool[np.ndarray, "b"], class_of_box: Int[np.ndarray, "b"]
 ) -> UInt8[np.ndarray, "h w"]:
     """The id of its class + 1, and 0 where the other has 0."""
-    return _values(keep, (class_of_box + 1).tolist())[masks.visible + 1].astype(np.uint8)
+    return _values(keep, (class_of_box + 1).tolist()).astype(np.uint8)[masks.visible]
 
 
 def _values(keep: Bool[np.ndarray, "b"], of_box: Sequence[int]) -> Int[np.ndarray, "k"]:
-    """What stands for each box where `visible + 1` is its place."""
-    return np.concatenate([[0], np.where(keep, np.array(of_box, dtype=np.int64), 0)])
+    """What stands for each box, and last for none: the place -1."""
+    return np.append(np.where(keep, np.array(of_box, dtype=np.int64), 0), 0)
 
 
 def _write(shard: Shard, files: Path, fragments: Path) -> FileDigests:

@@ -35,7 +35,6 @@ class Shard:
         sizes: (n, 2) width and height in pixels.
         classes: of the whole dataset; a class's id is its place, from 0.
         class_of_box: (b,) places in `classes`.
-        options: of the export.
         most_boxes: the largest b of all shards: frame number x most_boxes + box number is unique in the dataset.
         shapes: what the labels are drawn round, and the cameras of the images as they are written.
         table: labels of all boxes, those dropped included.
@@ -59,7 +58,6 @@ class Shard:
     sizes: Int[np.ndarray, "n 2"]
     classes: Sequence[PlannedClass]
     class_of_box: Int[np.ndarray, "b"]
-    options: ExportOptions
     most_boxes: int
     shapes: PosedShapes
     table: LabelTable
