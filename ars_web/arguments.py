@@ -112,7 +112,8 @@ Copy = Annotated[bool, typer.Option("--copy", help="Copy the images into the ses
 # export
 DatasetFormat = Annotated[str, typer.Option("--format", metavar="FORMAT", help="One that `ars-web formats` lists.")]
 DatasetFolder = Annotated[
-    Path, typer.Option("--out", metavar="DIR", help="The dataset's folder: a new one, or an empty one.")
+    str,
+    typer.Option("--out", metavar="DIR", help="The dataset's folder, new or empty; s3://BUCKET/DIR for a store."),
 ]
 FramesStep = Annotated[int | None, typer.Option("--frames-step", metavar="N", help="Every N-th frame; default 1.")]
 FramesStart = Annotated[int | None, typer.Option("--frames-start", metavar="N", help="From this index; default 0.")]

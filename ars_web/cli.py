@@ -218,11 +218,14 @@ def export(
     """Write a training set. Ctrl-C stops it; the same command then goes on from there."""
     from ars_web.datasets.cluster import cluster_at
     from ars_web.datasets.jobs import plan_export, run_export
+    from ars_web.datasets.store_export import plan_stored_export, run_stored_export
     from ars_web.datasets.registry import WRITERS
+    from ars_web.recordings.stores import place
     from ars_web.sessions.store import SessionStore
 
     if kind not in WRITERS:
         raise typer.BadParameter(f"{kind!r} is none of {', '.join(WRITERS)}", param_hint="--format")
+    target = place(out)
     cluster = cluster_at(executor, ca_file=tls_ca_file, cert=tls_cert, key=tls_key)
     with SessionStore(sessions) as store:
         ids = [store.find(name) for name in (session, *take.comma_separated(merge, "--merge"))]
@@ -245,21 +248,27 @@ def export(
         }
         options = take.export_options(given)
         snapshots = [store.snapshot(sid) for sid in ids]
-    plan = plan_export(snapshots, format=kind, options=options, out=out)
     try:
-        with progress("Exporting") as advance:
-            report = run_export(plan, workers=workers, cluster=cluster, on_progress=advance)
+        if isinstance(target, Path):
+            plan = plan_export(snapshots, format=kind, options=options, out=target)
+            target = plan.out
+            with progress("Exporting") as advance:
+                report = run_export(plan, workers=workers, cluster=cluster, on_progress=advance)
+        else:
+            plan = plan_stored_export(snapshots, format=kind, options=options)
+            with progress("Exporting") as advance:
+                report = run_stored_export(plan, target, workers=workers, cluster=cluster, on_progress=advance)
     except KeyboardInterrupt:
         note("ars-web: stopped; the same command goes on from here")
         raise typer.Exit(INTERRUPTED) from None
     if as_json:
-        print_json({"out": plan.out, "report": report.model_dump(mode="json")})
+        print_json({"out": str(target), "report": report.model_dump(mode="json")})
         return
     rows = [(name, s.images, s.negatives, s.labels) for name, s in report.splits.items()]
     print_table(("split", "images", "without a label", "labels"), rows)
     dropped = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in report.dropped.items() if count)
     print(f"dropped: {dropped or 'none'}")
-    print(plan.out)
+    print(target)
 
 
 @app.command()
