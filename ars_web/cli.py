@@ -218,8 +218,8 @@ def export(
     """Write a training set. Ctrl-C stops it; the same command then goes on from there."""
     from ars_web.datasets.cluster import cluster_at
     from ars_web.datasets.jobs import plan_export, run_export
-    from ars_web.datasets.store_export import plan_stored_export, run_stored_export
     from ars_web.datasets.registry import WRITERS
+    from ars_web.datasets.store_export import plan_stored_export, run_stored_export
     from ars_web.recordings.stores import place
     from ars_web.sessions.store import SessionStore
 
