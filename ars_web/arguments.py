@@ -100,7 +100,8 @@ RecordingFormat = Annotated[
     str, typer.Option("--format", metavar="FORMAT", help="auto, or one that `ars-web formats` lists.")
 ]
 ImageFolder = Annotated[
-    Path | None, typer.Option("--images", metavar="DIR", help="Image folder, if not the one the format implies.")
+    str | None,
+    typer.Option("--images", metavar="DIR", help="Image folder, if not the one the format implies; s3://BUCKET/DIR."),
 ]
 CameraFile = Annotated[
     Path | None,

@@ -151,12 +151,18 @@ def import_recording(
 ) -> None:
     """Make a session from a tracked recording; its id is the last line printed."""
     from ars_web.recordings.registry import READERS, ReadOptions, read_recording
+    from ars_web.recordings.stored_images import read_with_stored_images
+    from ars_web.recordings.stores import StoreFolder, place
     from ars_web.sessions.store import SessionStore
 
     if kind != "auto" and kind not in READERS:
         raise typer.BadParameter(f"{kind!r} is none of auto, {', '.join(READERS)}", param_hint="--format")
     class_names = take.comma_separated(classes, "--classes")
-    recording = read_recording(path, format=kind, options=ReadOptions(images=images, camera=camera))
+    folder = None if images is None else place(images)
+    if isinstance(folder, StoreFolder):
+        recording = read_with_stored_images(path, folder, format=kind, options=ReadOptions(camera=camera))
+    else:
+        recording = read_recording(path, format=kind, options=ReadOptions(images=folder, camera=camera))
     with SessionStore(sessions) as store, progress("Importing frames") as advance:
         made = store.create(
             recording,

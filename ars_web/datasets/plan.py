@@ -15,7 +15,7 @@ from jaxtyping import Float, Int
 
 from ars_web.datasets import splits
 from ars_web.datasets.file_names import stems
-from ars_web.datasets.images import source_stamp
+from ars_web.datasets.image_stamps import stamps_now
 from ars_web.datasets.options import ExportOptions, FrameChoice
 from ars_web.datasets.registry import writer_of
 from ars_web.datasets.samples import check_shape, hulls_of
@@ -64,10 +64,11 @@ class PlannedFrames:
         camera_id: (n,) key into the session's cameras.
         split: (n,) places in `splits.SPLITS`.
         Ts_world_camera: (n, 4, 4).
-        stamps: (n, 2) size in bytes and time of change in ns of the source images; zeros where none are wanted.
+        stamps: (n, 2) size in bytes and time of change in ns of the source images, of those on a store a number that
+            changes with them; zeros where none are wanted.
         names: in the session.
         stems: of the dataset's files.
-        sources: the images, absolute.
+        sources: the images, absolute, or their addresses on a store.
     """
 
     session: Int[np.ndarray, "n"]
@@ -147,7 +148,7 @@ def plan_export(
     all_stems = iter(stems(p + name for p, s in zip(prefixes, snapshots, strict=True) for name in s.frames.names))
     named = [[next(all_stems) for _ in s.frames.names] for s in snapshots]
     picked = [(number, i) for number, indices in enumerate(chosen) for i in indices.tolist()]
-    sources = tuple(os.fspath(snapshots[number].frames.images[i]) for number, i in picked)
+    sources = tuple(str(snapshots[number].frames.images[i]) for number, i in picked)
     frames = PlannedFrames(
         session=np.repeat(np.arange(len(snapshots)), counts),
         index=np.concatenate(chosen),
@@ -225,8 +226,9 @@ def _planned_session(snapshot: SessionSnapshot, class_names: tuple[str, ...], sh
 
 def _stamps(sources: Sequence[str]) -> Int[np.ndarray, "n 2"]:
     stamps = np.zeros((len(sources), 2), dtype=np.int64)
+    stamp = stamps_now()
     for row, source in enumerate(sources):
-        stamps[row] = source_stamp(source)
+        stamps[row] = stamp(source)
     return stamps
 
 

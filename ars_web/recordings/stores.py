@@ -11,6 +11,7 @@ import sys
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import datetime
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,9 @@ _REFUSED = {
     "http": "has no folders that can be listed or written to",
     "https": "has no folders that can be listed or written to",
 }
+
+_VERSIONS = ("ETag", "etag", "md5Hash", "content_md5", "mtime", "LastModified", "last_modified", "created")
+"""What file systems call that which changes with a file, the surest first."""
 
 # What these libraries raise is no OSError. Only those that are loaded can have raised something.
 _FOREIGN = (
@@ -212,8 +216,11 @@ def split_address(address: str) -> tuple[StoreFolder, str]:
 
 def _told(info: dict[str, Any]) -> tuple[int, str]:
     """Size and version out of what a file system says of a file."""
-    version = next((info[key] for key in ("ETag", "etag", "md5Hash", "mtime", "created") if info.get(key)), "")
-    return int(info["size"]), str(version)
+    version = next((info[key] for key in _VERSIONS if info.get(key)), "")
+    # Some file systems say the time as a number where they list, and as a time where they are asked for one file.
+    if isinstance(version, datetime):
+        version = version.timestamp()
+    return int(info["size"]), str(version).strip('"')
 
 
 @contextmanager
