@@ -123,7 +123,8 @@ RecordingFormat = Annotated[
     str, typer.Option("--format", metavar="FORMAT", help="auto, or one that `ars-web formats` lists.")
 ]
 ImageFolder = Annotated[
-    Path | None, typer.Option("--images", metavar="DIR", help="Image folder, if not the one the format implies.")
+    str | None,
+    typer.Option("--images", metavar="DIR", help="Image folder, if not the one the format implies; s3://BUCKET/DIR."),
 ]
 CameraFile = Annotated[
     Path | None,
@@ -135,7 +136,8 @@ Copy = Annotated[bool, typer.Option("--copy", help="Copy the images into the ses
 # export
 DatasetFormat = Annotated[str, typer.Option("--format", metavar="FORMAT", help="One that `ars-web formats` lists.")]
 DatasetFolder = Annotated[
-    Path, typer.Option("--out", metavar="DIR", help="The dataset's folder: a new one, or an empty one.")
+    str,
+    typer.Option("--out", metavar="DIR", help="The dataset's folder, new or empty; s3://BUCKET/DIR for a store."),
 ]
 FramesStep = Annotated[int | None, typer.Option("--frames-step", metavar="N", help="Every N-th frame; default 1.")]
 FramesStart = Annotated[int | None, typer.Option("--frames-start", metavar="N", help="From this index; default 0.")]

@@ -153,12 +153,18 @@ def import_recording(
 ) -> None:
     """Make a session from a tracked recording; its id is the last line printed."""
     from ars_web.recordings.registry import READERS, ReadOptions, read_recording
+    from ars_web.recordings.stored_images import read_with_stored_images
+    from ars_web.recordings.stores import StoreFolder, place
     from ars_web.sessions.store import SessionStore
 
     if kind != "auto" and kind not in READERS:
         raise typer.BadParameter(f"{kind!r} is none of auto, {', '.join(READERS)}", param_hint="--format")
     class_names = take.comma_separated(classes, "--classes")
-    recording = read_recording(path, format=kind, options=ReadOptions(images=images, camera=camera))
+    folder = None if images is None else place(images)
+    if isinstance(folder, StoreFolder):
+        recording = read_with_stored_images(path, folder, format=kind, options=ReadOptions(camera=camera))
+    else:
+        recording = read_recording(path, format=kind, options=ReadOptions(images=folder, camera=camera))
     with SessionStore(sessions) as store, progress("Importing frames") as advance:
         made = store.create(
             recording,
@@ -225,10 +231,17 @@ def export(
     from ars_web.datasets.jobs import plan_export, run_export
     from ars_web.datasets.readback.comparison import compare
     from ars_web.datasets.registry import WRITERS
+    from ars_web.datasets.store_export import plan_stored_export, run_stored_export
+    from ars_web.recordings.stores import place
     from ars_web.sessions.store import SessionStore
 
     if kind not in WRITERS:
         raise typer.BadParameter(f"{kind!r} is none of {', '.join(WRITERS)}", param_hint="--format")
+    target = place(out)
+    if check and not isinstance(target, Path):
+        raise typer.BadParameter(
+            f"a set on a store is not read back; export it to a folder, not to {target}", param_hint="--check"
+        )
     cluster = cluster_at(executor, ca_file=tls_ca_file, cert=tls_cert, key=tls_key)
     with SessionStore(sessions) as store:
         ids = [store.find(name) for name in (session, *take.comma_separated(merge, "--merge"))]
@@ -253,16 +266,22 @@ def export(
         }
         options = take.export_options(given)
         snapshots = [store.snapshot(sid) for sid in ids]
-    plan = plan_export(snapshots, format=kind, options=options, out=out)
     try:
-        with progress("Exporting") as advance:
-            report = run_export(plan, workers=workers, cluster=cluster, on_progress=advance)
+        if isinstance(target, Path):
+            plan = plan_export(snapshots, format=kind, options=options, out=target)
+            target = plan.out
+            with progress("Exporting") as advance:
+                report = run_export(plan, workers=workers, cluster=cluster, on_progress=advance)
+        else:
+            plan = plan_stored_export(snapshots, format=kind, options=options)
+            with progress("Exporting") as advance:
+                report = run_stored_export(plan, target, workers=workers, cluster=cluster, on_progress=advance)
     except KeyboardInterrupt:
         note("ars-web: stopped; the same command goes on from here")
         raise typer.Exit(INTERRUPTED) from None
     checked = compare(plan, plan.out) if check else None
     if as_json:
-        print_json({"out": plan.out, "report": report.model_dump(mode="json"), "check": checked})
+        print_json({"out": str(target), "report": report.model_dump(mode="json"), "check": checked})
     else:
         rows = [(name, s.images, s.negatives, s.labels) for name, s in report.splits.items()]
         print_table(("split", "images", "without a label", "labels"), rows)
@@ -272,7 +291,7 @@ def export(
             print(f"lost: {loss}")
         if checked is not None:
             print(*checked.lines(), sep="\n")
-        print(plan.out)
+        print(target)
     if checked is not None and not checked.agrees:
         raise typer.Exit(1)
 

@@ -141,5 +141,12 @@ def dask_cluster() -> ModuleType:
     return _beside("dask_cluster")
 
 
+@pytest.fixture(scope="module")
+def s3(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]:
+    """An S3 server with an empty bucket called `bucket`, and the environment variables by which it is found."""
+    with _beside("s3_server").running_s3(tmp_path_factory.mktemp("s3") / "log") as found:
+        yield found
+
+
 def pytest_report_header() -> str:
     return f"recorded data: {SHARED if (SHARED / 'data').is_dir() else 'absent, tests/recorded/ is not collected'}"

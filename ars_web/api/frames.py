@@ -11,6 +11,7 @@ from ars_web.api.pictures import PictureRequest, recorded_image
 from ars_web.api.problems import documented
 from ars_web.datasets.samples import frame_labels
 from ars_web.errors import NotFound
+from ars_web.recordings.stored_images import local
 
 router = APIRouter(prefix="/api/sessions/{sid}", tags=["frames"], route_class=StrictRoute)
 
@@ -70,7 +71,7 @@ def image(
     table = services.store.frames(sid)
     _check(sid, index, len(table))
     camera = services.store.cameras(sid)[int(table.camera_ids[index])]
-    path = recorded_image(table.images[index], own=services.store.folder / sid)
+    path = recorded_image(local(table.images[index]), own=services.store.folder / sid)
     part = None if crop is None else crop_from_text(crop, width=camera.width, height=camera.height)
     request = PictureRequest(path, camera, width, rectified, part)
     headers = {"ETag": request.etag(), "Cache-Control": IMAGE_CACHE}

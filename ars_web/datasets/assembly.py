@@ -33,18 +33,22 @@ def assemble(plan: ExportPlan, partial: Path) -> ExportReport:
     shards = [shard_folder(partial, number) for number in range(len(plan.shards))]
     for shard in shards:
         _move_files(str(shard / "files"), str(dataset))
-    described = Dataset(
+    joined = writer.join(description_of(plan), [shard / "fragments" for shard in shards], dataset)
+    counted = (ShardReport.model_validate_json((shard / "shard.json").read_bytes()) for shard in shards)
+    report = report_of(plan, counted, joined)
+    (dataset / DOCUMENT).write_bytes(report.as_file())
+    return report
+
+
+def description_of(plan: ExportPlan) -> Dataset:
+    """What a writer needs to join the plan's shards."""
+    return Dataset(
         splits=used_splits(plan),
         classes=plan.classes,
         sessions=plan.sessions,
         options=plan.options,
         description="Labels of virtual boxes, by ARS Web",
     )
-    joined = writer.join(described, [shard / "fragments" for shard in shards], dataset)
-    counted = (ShardReport.model_validate_json((shard / "shard.json").read_bytes()) for shard in shards)
-    report = report_of(plan, counted, joined)
-    (dataset / DOCUMENT).write_text(report.model_dump_json(indent=2) + "\n", encoding="utf-8")
-    return report
 
 
 def publish(plan: ExportPlan, partial: Path) -> None:

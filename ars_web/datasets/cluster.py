@@ -20,6 +20,7 @@ from urllib.parse import urlsplit
 
 from ars_web import __version__
 from ars_web.errors import BadInput
+from ars_web.recordings import stores
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -295,15 +296,35 @@ def unseen(token: str, content: str, images: Sequence[str]) -> str | None:
     Runs on a worker.
     """
     try:
-        seen = Path(token).read_text(encoding="ascii")
-    except (OSError, UnicodeDecodeError):
-        seen = ""
-    if seen != content:
-        return f"does not see {Path(token).parent}: the dataset must lie where every worker has it under that path"
+        seen = _read(token)
+    except BadInput as error:
+        return f"cannot read {token}: {error}"
+    except OSError:
+        seen = b""
+    if seen != content.encode():
+        folder = token.rpartition("/")[0]
+        return f"does not see {folder}: the dataset must lie where every worker has it under that name"
     for image in images:
-        if not Path(image).is_file():
-            return f"does not see the image {image}: images must lie where every worker has them under their path"
+        if not _is_file(image):
+            return f"does not see the image {image}: images must lie where every worker has them under that name"
     return None
+
+
+def _read(file: str) -> bytes:
+    if not stores.is_address(file):
+        return Path(file).read_bytes()
+    folder, name = stores.split_address(file)
+    return folder.read(name)
+
+
+def _is_file(file: str) -> bool:
+    if not stores.is_address(file):
+        return Path(file).is_file()
+    folder, name = stores.split_address(file)
+    try:
+        return folder.has(name)
+    except OSError:
+        return False
 
 
 class _ClusterExecutor(Executor):

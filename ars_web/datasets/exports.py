@@ -31,6 +31,7 @@ from ars_web.datasets.planned import ExportPlan
 from ars_web.datasets.registry import writer_of
 from ars_web.datasets.shapes import check_shape
 from ars_web.errors import ArsError, BadInput, Cancelled, Conflict, NotFound, StoreError
+from ars_web.recordings.recording import StoredImage
 from ars_web.sessions.model import SessionSnapshot
 
 _log = logging.getLogger(__name__)
@@ -315,6 +316,8 @@ class ExportJobs:
     def _snapshots(self, sid: str, options: ExportOptions) -> Sequence[SessionSnapshot]:
         snapshots = [self._snapshot_of(i) for i in (sid, *options.sessions)]
         check_merged(snapshots)
+        if options.images != "none":
+            _refuse_stored(snapshots)
         return snapshots
 
     def _finished_report(self, job_id: str) -> dict[str, Any] | None:
@@ -368,6 +371,17 @@ class ExportJobs:
         for folder in (self._out(job_id), partial_folder(self._out(job_id))):
             with suppress(FileNotFoundError):
                 shutil.rmtree(folder)
+
+
+def _refuse_stored(snapshots: Sequence[SessionSnapshot]) -> None:
+    """Raises BadInput where images lie on a store: a server fetches nothing from anywhere."""
+    for snapshot in snapshots:
+        stored = next((image for image in snapshot.frames.images if isinstance(image, StoredImage)), None)
+        if stored is not None:
+            raise BadInput(
+                f"the images of session {snapshot.id} lie on a store ({stored}), from which a server does not read:"
+                " export it with the command line's `ars-web export`, or here with `images` `none`"
+            )
 
 
 def _bytes_below(folder: Path) -> int:

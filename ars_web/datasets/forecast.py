@@ -15,6 +15,7 @@ from ars_web.datasets.registry import writer_of
 from ars_web.datasets.report import ClassUsed, SessionUsed, ShardReport, SplitCounts, report_of
 from ars_web.datasets.splits import SPLITS
 from ars_web.errors import Cancelled
+from ars_web.recordings.stores import is_address
 
 LABELS_AT_ONCE = 20_000
 """Boxes times frames between two looks whether the caller still waits; a fraction of a second."""
@@ -99,7 +100,7 @@ def _images(plan: ExportPlan) -> tuple[ImageCounts, int, int]:
         for source, stem, session, camera_id, bytes_ in zip(frames.sources, frames.stems, *columns, strict=True):
             target = image_name(stem, source, only_jpeg=writer.only_jpeg, only_png=writer.only_png)
             how = placement(source, target, camera=plan.sessions[session].cameras[camera_id], images=options.images)
-            if how == "linked" and device(source.rpartition("/")[0]) != here:
+            if how == "linked" and (is_address(source) or device(source.rpartition("/")[0]) != here):
                 how = "copied"
             counts[how] += 1
             size += bytes_

@@ -13,6 +13,7 @@ from ars_web.datasets.samples import kept, labels_of_shapes
 from ars_web.datasets.shapes import posed_shapes
 from ars_web.errors import BadInput
 from ars_web.recordings.images import read_image
+from ars_web.recordings.stored_images import local
 from ars_web.sessions.model import SessionSnapshot
 
 JPEG_QUALITY = 88
@@ -61,7 +62,7 @@ def draw_format(
     writer = writer_of(format)
     found = frame_shapes(snapshot, index, shape=options.shape)
     keep, _ = kept(found.table, options)
-    canvas = Canvas(read_image(snapshot.frames.images[index]))
+    canvas = Canvas(read_image(local(snapshot.frames.images[index])))
     boxes = [box for _, box in sorted(snapshot.state.boxes.items())]
     colors = [color_of(snapshot.state.classes[box.class_id].color) for box in boxes]
     # What is drawn first lies below: areas, then lines, then points.

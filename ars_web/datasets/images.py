@@ -7,7 +7,6 @@ its camera's size.
 import errno
 import os
 import shutil
-import stat
 from functools import lru_cache
 from pathlib import Path
 from typing import Literal
@@ -16,6 +15,7 @@ import cv2
 import numpy as np
 from jaxtyping import UInt8
 
+from ars_web.datasets.image_stamps import source_stamp, stored_stamp
 from ars_web.errors import BadFile
 from ars_web.geometry.camera import (
     Camera,
@@ -25,8 +25,11 @@ from ars_web.geometry.camera import (
 )
 from ars_web.recordings.image_header import read_header
 from ars_web.recordings.images import read_image
+from ars_web.recordings.stores import is_address, split_address
 
 JPEG_QUALITY = 95
+
+_CHANGED = "the image changed since the export was planned; start the export again"
 
 _JPEG_SUFFIXES = (".jpg", ".jpeg")
 
@@ -55,7 +58,34 @@ def place_image(source: str, target: str, *, camera: Camera, stamp: tuple[int, i
         BadFile: the source is missing, damaged, changed, a link, or not of its camera's size.
         OSError: the target cannot be written.
     """
+    if is_address(source):
+        _place_stored(source, target, camera=camera, stamp=stamp, images=images)
+        return
     _check_unchanged(source, stamp)
+    _place(source, target, camera=camera, images=images)
+
+
+def _place_stored(source: str, target: str, *, camera: Camera, stamp: tuple[int, int], images: str) -> None:
+    """The same for an image on a store, which is fetched first."""
+    fetched = f"{target}.fetched{_suffix(source)}"
+    folder, name = split_address(source)
+    if stored_stamp(source) != stamp:
+        raise BadFile(source, _CHANGED)
+    try:
+        content = folder.read(name)
+    except OSError as error:
+        raise BadFile(source, f"the image cannot be exported: {error.strerror or error}") from error
+    Path(fetched).write_bytes(content)
+    try:
+        # What was fetched is ours alone: it need not be copied once more.
+        _place(fetched, target, camera=camera, images="link" if images == "copy" else images)
+    except BadFile as error:
+        raise BadFile(source, str(error).removeprefix(f"{fetched}: ")) from error
+    finally:
+        Path(fetched).unlink()
+
+
+def _place(source: str, target: str, *, camera: Camera, images: str) -> None:
     header = read_header(Path(source))
     if not header.whole:
         raise BadFile(source, "the image ends before its data does (truncated)")
@@ -101,27 +131,9 @@ def _rectifying_maps(camera: Camera) -> tuple[np.ndarray, np.ndarray]:
     return whole, fraction
 
 
-def source_stamp(source: str) -> tuple[int, int]:
-    """The size in bytes and the time of change in ns of an image that is to be exported.
-
-    Sessions keep paths without links, so a link is what someone put in the image's place. Besides, a hard link to it
-    would be a link, out of the dataset.
-
-    Raises:
-        BadFile: it is missing, or has become a link.
-    """
-    try:
-        status = os.lstat(source)
-    except OSError as error:
-        raise BadFile(source, f"the image cannot be exported: {error.strerror}") from error
-    if stat.S_ISLNK(status.st_mode):
-        raise BadFile(source, "the image has become a link since it was imported; import the recording again")
-    return status.st_size, status.st_mtime_ns
-
-
 def _check_unchanged(source: str, stamp: tuple[int, int]) -> None:
     if source_stamp(source) != stamp:
-        raise BadFile(source, "the image changed since the export was planned; start the export again")
+        raise BadFile(source, _CHANGED)
 
 
 def _same_encoding(source: str, target: str) -> bool:

@@ -72,7 +72,7 @@ def run_export(
     usable_out(plan.out)
     partial = partial_folder(plan.out)
     place = Workplace(
-        executor_factory or (lambda: _default_executor(plan, workers)), (BrokenExecutor,), cancelled or _never
+        executor_factory or (lambda: local_executor(plan, workers)), (BrokenExecutor,), cancelled or _never
     )
     try:
         partial.mkdir(parents=True, exist_ok=True)
@@ -145,7 +145,8 @@ def _remove(entry: Path) -> None:
         entry.unlink()
 
 
-def _default_executor(plan: ExportPlan, workers: int | None) -> Executor:
+def local_executor(plan: ExportPlan, workers: int | None) -> Executor:
+    """A thread of this process for a small export, else a pool of `workers` processes."""
     if plan.seconds < POOL_FROM_SECONDS or len(plan.shards) == 1:
         return ThreadPoolExecutor(max_workers=1)
     # Spawned, never forked: numba's and OpenCV's threads do not survive a fork.

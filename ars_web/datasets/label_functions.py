@@ -15,7 +15,10 @@ from ars_web.datasets.shape_rings import columns_of, rings_of_shapes
 from ars_web.datasets.shapes import PosedShapes
 from ars_web.errors import BadInput
 from ars_web.geometry.convex_outlines import convex_outlines, convex_outlines_of_boxes
+from ars_web.geometry.hidden_points import hidden
+from ars_web.geometry.instance_masks import instance_masks
 from ars_web.geometry.labels import outlines
+from ars_web.geometry.mask_outlines import even_outlines, pixel_outlines
 from ars_web.geometry.mesh_outlines import mesh_regions
 from ars_web.geometry.minimum_rectangles import minimum_rectangles
 from ars_web.geometry.projected_points import project_points
@@ -106,6 +109,21 @@ def _convex_rings(
     return rings_of_shapes(shapes, wanted, of_boxes=convex_outlines_of_boxes, of_meshes=convex_outlines)
 
 
+def _mask(shapes: PosedShapes, table: LabelTable, wanted: Bool[np.ndarray, "n b"]) -> Marks:
+    """The border of the pixels in which no nearer shape is seen, stairs evened out."""
+    labels: list[list[Float[np.ndarray, "k 2"]]] = [[] for _ in range(wanted.size)]
+    for row in np.flatnonzero(wanted.any(axis=1)).tolist():
+        camera = shapes.cameras[int(shapes.camera_ids[row])]
+        masks = instance_masks(camera, shapes.Ts_world_camera[row], shapes.boxes, shapes.meshes)
+        for column in np.flatnonzero(wanted[row]).tolist():
+            seen = masks.visible_of(column)
+            if seen.mask.any():
+                corner = np.array([seen.column, seen.row], dtype=np.float64)
+                rings = even_outlines(pixel_outlines(seen.mask))
+                labels[row * wanted.shape[1] + column] = [ring + corner for ring in rings]
+    return _rings_alone(rings_of(labels), wanted)
+
+
 def _keypoints(shapes: PosedShapes, table: LabelTable, wanted: Bool[np.ndarray, "n b"]) -> Marks:
     """The object's named points: by default its centre and its box's eight corners."""
     b, k = shapes.keypoints_world.shape[:2]
@@ -116,7 +134,8 @@ def _keypoints(shapes: PosedShapes, table: LabelTable, wanted: Bool[np.ndarray, 
         points[rows] = found
         with np.errstate(invalid="ignore"):
             inside = ((found >= 0.0) & (found <= [camera.width, camera.height])).all(axis=-1)
-        states[rows] = np.where(inside & wanted[rows, :, None], SEEN, UNSEEN)
+        behind = hidden(shapes.Ts_world_camera[rows], shapes.keypoints_world, shapes.boxes, shapes.meshes, np.arange(b))
+        states[rows] = np.where(inside & wanted[rows, :, None], np.where(behind, HIDDEN, SEEN), UNSEEN)
     none = one_ring_each(np.zeros((0, 2)), np.zeros(wanted.size + 1, dtype=np.int64))
     return Marks(none, points, states)
 

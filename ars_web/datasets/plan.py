@@ -14,7 +14,7 @@ from jaxtyping import Int
 
 from ars_web.datasets import splits
 from ars_web.datasets.file_names import stems
-from ars_web.datasets.images import source_stamp
+from ars_web.datasets.image_stamps import stamps_now
 from ars_web.datasets.options import ExportOptions, FrameChoice
 from ars_web.datasets.planned import ExportPlan, PlannedClass, PlannedFrames, PlannedSession, seconds_per_frame
 from ars_web.datasets.registry import writer_of
@@ -70,7 +70,7 @@ def plan_export(
     all_stems = iter(stems(p + name for p, s in zip(prefixes, snapshots, strict=True) for name in s.frames.names))
     named = [[next(all_stems) for _ in s.frames.names] for s in snapshots]
     picked = [(number, i) for number, indices in enumerate(chosen) for i in indices.tolist()]
-    sources = tuple(os.fspath(snapshots[number].frames.images[i]) for number, i in picked)
+    sources = tuple(str(snapshots[number].frames.images[i]) for number, i in picked)
     frames = PlannedFrames(
         session=np.repeat(np.arange(len(snapshots)), counts),
         index=np.concatenate(chosen),
@@ -173,8 +173,9 @@ def _planned_session(snapshot: SessionSnapshot, class_names: Sequence[str], shap
 
 def _stamps(sources: Sequence[str]) -> Int[np.ndarray, "n 2"]:
     stamps = np.zeros((len(sources), 2), dtype=np.int64)
+    stamp = stamps_now()
     for row, source in enumerate(sources):
-        stamps[row] = source_stamp(source)
+        stamps[row] = stamp(source)
     return stamps
 
 

@@ -73,10 +73,11 @@ class PlannedFrames:
         camera_id: (n,) key into the session's cameras.
         split: (n,) places in `splits.SPLITS`.
         Ts_world_camera: (n, 4, 4).
-        stamps: (n, 2) size in bytes and time of change in ns of the source images; zeros where none are wanted.
+        stamps: (n, 2) size in bytes and time of change in ns of the source images, of those on a store a number that
+            changes with them; zeros where none are wanted.
         names: in the session.
         stems: of the dataset's files.
-        sources: the images, absolute.
+        sources: the images, absolute, or their addresses on a store.
     """
 
     session: Int[np.ndarray, "n"]

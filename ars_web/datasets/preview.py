@@ -15,6 +15,7 @@ from ars_web.datasets.samples import FrameLabel, frame_labels, labels_in_frames
 from ars_web.datasets.shapes import meshes_of
 from ars_web.errors import BadInput, NotFound, StoreError
 from ars_web.recordings.images import read_image
+from ars_web.recordings.stored_images import local
 from ars_web.sessions.model import SessionSnapshot
 
 HARDLY_VISIBLE = 0.05
@@ -88,7 +89,7 @@ def draw_frame(snapshot: SessionSnapshot, index: int) -> UInt8[np.ndarray, "h w 
     """The frame's image (BGR, enlarged where it is small) with outlines, edges, boxes, names and shares visible."""
     if not 0 <= index < len(snapshot.frames):
         raise NotFound(f"session {snapshot.id} has no frame {index}; its frames are 0 to {len(snapshot.frames) - 1}")
-    canvas = Canvas(read_image(snapshot.frames.images[index]))
+    canvas = Canvas(read_image(local(snapshot.frames.images[index])))
     labels = [label for label in frame_labels(snapshot, index) if label.bbox is not None]
     # Far boxes first: near ones are drawn over them, as they are seen.
     labels.sort(key=lambda label: -_distance(snapshot, index, label))

@@ -85,6 +85,10 @@ class ExportReport(_Record):
         description="over the label files: the SHA-256 of what `sha256sum` prints for them in byte order of their paths"
     )
 
+    def as_file(self) -> bytes:
+        """The content of `dataset.json`."""
+        return f"{self.model_dump_json(indent=2)}\n".encode()
+
 
 def report_of(plan: ExportPlan, shards: Iterable[ShardReport], joined: Mapping[str, str]) -> ExportReport:
     """The report of a plan whose shards are done; `joined` are the digests of label files that span shards."""

@@ -21,7 +21,7 @@ from ars_web.geometry.labels import BoxLabels
 from ars_web.geometry.mesh import Mesh
 from ars_web.geometry.mesh_labels import labels_of_meshes
 from ars_web.geometry.mesh_outlines import mesh_outlines
-from ars_web.geometry.occlusion import visible_fractions
+from ars_web.geometry.shape_occlusion import visible_shares
 from ars_web.sessions.model import FrameTable, SessionSnapshot
 
 Meshes = Sequence[Mesh | None]
@@ -39,9 +39,8 @@ class LabelTable:
         bbox: (n, b, 4) of the part in the image; NaN where no part is in it.
         bbox_amodal: (n, b, 4) of the whole object, unclipped; NaN where nothing is in front of the camera.
         truncated: (n, b) share of the amodal outline outside the image; 1 where bbox is NaN.
-        visible: (n, b) share of the in-image outline that no nearer box hides; NaN where bbox is NaN or where it
-            was not asked for. Here hulls count as their boxes: of each box the part over `bbox`, hidden by the other
-            boxes as far as their own `bbox` reaches.
+        visible: (n, b) share of the in-image outline that no nearer shape hides; NaN where bbox is NaN or where it
+            was not asked for. A shape is what labels are drawn round: the box, the hull or the mesh.
     """
 
     bbox: Float[np.ndarray, "n b 4"]
@@ -109,11 +108,12 @@ def labels_in_frames(
 ) -> LabelTable:
     """Labels of every box, or its hull, in every frame; frames are taken together camera by camera.
 
-    `with_visible` False spares the search for nearer boxes; `step` is its grid in pixels.
+    `with_visible` False spares the search for nearer shapes; `step` is its grid in pixels.
     """
     n, b = len(camera_ids), len(boxes)
     table = LabelTable(np.full((n, b, 4), np.nan), np.full((n, b, 4), np.nan), np.ones((n, b)), np.full((n, b), np.nan))
-    solids, plain = columns_of(meshes or [None] * b)
+    shapes = list(meshes) if meshes is not None else [None] * b
+    solids, plain = columns_of(shapes)
     for camera, rows in by_camera(cameras, camera_ids):
         Ts = Ts_world_camera[rows]
         found: list[tuple[list[int], BoxLabels]] = []
@@ -126,7 +126,7 @@ def labels_in_frames(
             table.bbox[place], table.bbox_amodal[place] = labels.bbox, labels.bbox_amodal
             table.truncated[place] = labels.truncated
         if with_visible and b:
-            table.visible[rows] = visible_fractions(camera, Ts, list(boxes), table.bbox[rows], step=step)
+            table.visible[rows] = visible_shares(camera, Ts, boxes, shapes, table.bbox[rows], step=step)
     return table
 
 

@@ -84,9 +84,23 @@ def export_shard(partial: str, number: int, digest: str) -> int:
         OSError: the shard cannot be written.
     """
     plan, folder = _plan(partial, digest), Path(partial)
-    check = _watch(folder / CANCEL)
+    check = watch((folder / CANCEL).exists)
     check()
     tmp = new_folder(folder, number)
+    frames = fill_shard(plan, number, tmp, check)
+    check()
+    whole = shard_folder(folder, number)
+    # A try that was given up may have ended well after all. Its bytes are the same.
+    if not whole.is_dir():
+        tmp.rename(whole)
+    return frames
+
+
+def fill_shard(plan: ExportPlan, number: int, tmp: Path, check: Callable[[], None]) -> int:
+    """Write shard `number` into the empty folder `tmp`: `files`, `fragments` and `shard.json`; its count of frames.
+
+    `check` is called often and may raise to end it.
+    """
     for name in ("files", "fragments"):
         (tmp / name).mkdir()
     writer = writer_of(plan.format)
@@ -102,11 +116,6 @@ def export_shard(partial: str, number: int, digest: str) -> int:
     counts = split_counts(shard.splits, shard.keep, shard.class_of_box.tolist(), shard.class_names)
     report = ShardReport(splits=counts, dropped=dropped, digests=digests)
     (tmp / "shard.json").write_text(report.model_dump_json(), encoding="utf-8")
-    check()
-    whole = shard_folder(folder, number)
-    # A try that was given up may have ended well after all. Its bytes are the same.
-    if not whole.is_dir():
-        tmp.rename(whole)
     return len(shard.stems)
 
 
@@ -116,16 +125,16 @@ def _plan(partial: str, digest: str) -> ExportPlan:
     return read_plan(Path(partial), out=Path(partial))
 
 
-def _watch(marker: Path) -> Callable[[], None]:
-    """A check that is cheap to call often and raises Cancelled once the marker is there."""
+def watch(asked: Callable[[], bool], *, every: float = _LOOK_EVERY) -> Callable[[], None]:
+    """A check that is cheap to call often and raises Cancelled once someone `asked` the workers to stop."""
     next_look = 0.0
 
     def check() -> None:
         nonlocal next_look
         now = time.monotonic()
         if now >= next_look:
-            next_look = now + _LOOK_EVERY
-            if marker.exists():
+            next_look = now + every
+            if asked():
                 raise Cancelled("the export was cancelled")
 
     return check

@@ -10,19 +10,29 @@ from ars_web.geometry.box import Box
 from ars_web.geometry.camera import Camera
 
 
+@dataclass(frozen=True)
+class StoredImage:
+    """An image on a store, by its address (`s3://BUCKET/FOLDER/NAME`)."""
+
+    address: str
+
+    def __str__(self) -> str:
+        return self.address
+
+
 @dataclass(frozen=True, eq=False)
 class Frame:
     """One image with its camera's pose.
 
     Attributes:
         name: the image's path relative to the recording's image folder, with `/`; unique in the recording.
-        image: where the image lies, absolute.
+        image: where the image lies: absolute, or on a store.
         camera_id: key into the recording's cameras.
         T_world_camera: (4, 4), OpenCV camera axes, metres.
     """
 
     name: str
-    image: Path
+    image: Path | StoredImage
     camera_id: int
     T_world_camera: Float[np.ndarray, "4 4"]
 

@@ -18,6 +18,8 @@ from ars_web.errors import BadInput
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.camera import Camera, image_from_pixels, rectified
 from ars_web.recordings.images import read_reduced
+from ars_web.recordings.recording import StoredImage
+from ars_web.recordings.stored_images import local
 from ars_web.scene.extent import Extent
 from ars_web.sessions.model import FrameTable
 
@@ -83,13 +85,13 @@ def thinned(centres: Float[np.ndarray, "n 3"], *, apart: float, most: int) -> In
     return np.unique(np.clip(np.searchsorted(way, stations - 1e-12), 0, len(centres) - 1))
 
 
-def frustum_photo(image: Path, camera: Camera) -> UInt8[np.ndarray, "h w 3"]:
+def frustum_photo(image: Path | StoredImage, camera: Camera) -> UInt8[np.ndarray, "h w 3"]:
     """A small RGB picture of a frame, rectified where the frustum is.
 
     Raises:
         BadFile, TooLarge: the image cannot be used (see `recordings.images`).
     """
-    small = read_reduced(image, width=PHOTO_WIDTH)
+    small = read_reduced(local(image), width=PHOTO_WIDTH)
     height, width = small.shape[:2]
     if camera.model != "pinhole":
         reduced = reduced_camera(camera, width=width, height=height)

@@ -16,11 +16,13 @@ from typing import Literal
 
 import cv2
 
-from ars_web.datasets.images import rectify, source_stamp
+from ars_web.datasets.image_stamps import source_stamp
+from ars_web.datasets.images import rectify
 from ars_web.errors import ArsError, BadFile, NotFound
 from ars_web.geometry.camera import Camera, rectified
 from ars_web.recordings.image_header import read_header
 from ars_web.recordings.images import read_image
+from ars_web.recordings.stored_images import local
 from ars_web.sessions.model import FrameTable
 
 JPEG_QUALITY = 92
@@ -110,7 +112,7 @@ class Photos:
             return None
         stamp, photo = kept
         try:
-            if source_stamp(str(self._frames.images[frame])) != stamp:
+            if source_stamp(str(local(self._frames.images[frame]))) != stamp:
                 return None
         except BadFile:
             return None  # making it anew says what is wrong with it
@@ -118,7 +120,7 @@ class Photos:
         return photo
 
     def _photo(self, frame: int) -> Photo:
-        path = self._frames.images[frame]
+        path = local(self._frames.images[frame])
         stamp = source_stamp(str(path))
         photo = make_photo(frame, path, self._cameras[int(self._frames.camera_ids[frame])])
         self._keep(stamp, photo)

@@ -13,6 +13,7 @@ from ars_web.recordings.options import ReadOptions, real
 from ars_web.recordings.overview import Overview, overview
 from ars_web.recordings.recording import Recording
 from ars_web.recordings.registry import detect_formats, read_recording
+from ars_web.recordings.stored_images import local
 
 REMEMBERED = 32
 """Looks whose frames can be shown; beyond that the oldest is forgotten."""
@@ -94,7 +95,7 @@ class ImportLooks:
         frames = {index: recording.frames[index] for index in samples}
         # The images as they are now: one that becomes a link later is not what was looked at.
         images = {
-            index: LookedImage(real(frame.image), recording.cameras[frame.camera_id], within)
+            index: LookedImage(real(local(frame.image)), recording.cameras[frame.camera_id], within)
             for index, frame in frames.items()
         }
         with self._lock:

@@ -1,13 +1,13 @@
 """Filling a new session's folder from a recording: its first state, its database, and its images if copied."""
 
 import os
-import shutil
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
 from ars_web.errors import BadInput, StoreError
 from ars_web.recordings.recording import Recording
+from ars_web.recordings.stored_images import copy_image
 from ars_web.sessions import migration, rows
 from ars_web.sessions.database import Database
 from ars_web.sessions.model import ObjectClass, SessionState, VirtualBox
@@ -108,16 +108,8 @@ def _copy_images(recording: Recording, images: Path, progress: Progress | None) 
     for done, frame in enumerate(recording.frames, start=1):
         target = images / frame.name
         try:
-            source = frame.image.open("rb")
-        except OSError as error:
-            raise BadInput(
-                f"{frame.image}: the image of frame {frame.name!r} cannot be read: {error.strerror}"
-            ) from error
-        try:
-            with source:
-                target.parent.mkdir(parents=True, exist_ok=True)
-                with target.open("xb") as copy:
-                    shutil.copyfileobj(source, copy, length=1 << 20)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            copy_image(frame.image, target)
         except OSError as error:
             raise StoreError(f"{target}: the image cannot be copied here: {error.strerror}") from error
         if progress is not None:

@@ -15,6 +15,7 @@ from ars_web.geometry.camera import Camera
 from ars_web.geometry.keypoints import DEFAULT_KEYPOINTS, Keypoint
 from ars_web.geometry.polygon import Polygon
 from ars_web.geometry.symmetry import NO_SYMMETRY, Symmetry
+from ars_web.recordings.recording import StoredImage
 from ars_web.sessions.hull_mesh import HullMesh
 from ars_web.sessions.object_mesh import ObjectMesh
 
@@ -167,13 +168,13 @@ class FrameTable:
 
     Attributes:
         names: relative image names with `/`, unique.
-        images: absolute paths.
+        images: absolute paths, or addresses on a store.
         camera_ids: (n,) keys into the session's cameras.
         Ts_world_camera: (n, 4, 4).
     """
 
     names: tuple[str, ...]
-    images: tuple[Path, ...]
+    images: tuple[Path | StoredImage, ...]
     camera_ids: np.ndarray
     Ts_world_camera: Float[np.ndarray, "n 4 4"]
 

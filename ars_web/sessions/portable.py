@@ -19,6 +19,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from ars_web.errors import BadFile, BadInput, RefusedPath, StoreError
+from ars_web.recordings.stored_images import local
 from ars_web.sessions import rows
 from ars_web.sessions.archive import DEFAULT_LIMITS, ArchiveLimits, extract_zip
 from ars_web.sessions.checking import check_database, check_portable, check_strange
@@ -118,7 +119,7 @@ def _copy(frames: FrameTable, images: Path, progress: Progress | None) -> None:
     for done, (name, image) in enumerate(zip(frames.names, frames.images, strict=True), start=1):
         target = images / name
         target.parent.mkdir(parents=True, exist_ok=True)
-        _copy_file(image, target)
+        _copy_file(local(image), target)
         if progress is not None:
             progress(done, len(frames))
 
@@ -127,7 +128,7 @@ def _pack(database: Path, frames: FrameTable, target: Path, progress: Progress |
     with zipfile.ZipFile(target, "x", compression=zipfile.ZIP_STORED) as archive:
         _add(archive, database, DATABASE)
         for done, (name, image) in enumerate(zip(frames.names, frames.images, strict=True), start=1):
-            _add(archive, image, f"{IMAGES}/{name}")
+            _add(archive, local(image), f"{IMAGES}/{name}")
             if progress is not None:
                 progress(done, len(frames))
 

@@ -15,7 +15,8 @@ from sqlalchemy.dialects.sqlite import insert as upsert
 from ars_web.errors import StoreError
 from ars_web.geometry.box import Box
 from ars_web.geometry.camera import Camera
-from ars_web.recordings.recording import Recording, SkippedFrame
+from ars_web.recordings.recording import Recording, SkippedFrame, StoredImage
+from ars_web.recordings.stores import is_address
 from ars_web.sessions import hull_rows, mask_rows, tables
 from ars_web.sessions.edit_json import (
     changes_from_json,
@@ -116,7 +117,7 @@ def load_frames(connection: Connection, folder: Path) -> FrameTable:
     rows = connection.execute(select(f.name, f.image, f.camera_id, f.pose).order_by(f.idx)).all()
     names = tuple(row[0] for row in rows)
     own = folder / IMAGES
-    images = tuple(own / row[0] if row[1] is None else Path(row[1]) for row in rows)
+    images = tuple(own / row[0] if row[1] is None else _image(row[1]) for row in rows)
     camera_ids = np.array([row[2] for row in rows], dtype=np.int64)
     poses = _transforms(b"".join(row[3] for row in rows), count=len(rows))
     camera_ids.flags.writeable = False
@@ -247,12 +248,16 @@ def insert_recording(
     _insert_all(connection, tables.box, [_box_row(b) for b in state.boxes.values()])
 
 
-def _unlinked(image: Path) -> Path:
+def _image(text: str) -> Path | StoredImage:
+    return StoredImage(text) if is_address(text) else Path(text)
+
+
+def _unlinked(image: Path | StoredImage) -> Path | StoredImage:
     """Where the image lies: a link is followed now, so that whoever changes it later shows nothing else here.
 
     Readers have followed the links to its folder already.
     """
-    return image.resolve() if image.is_symlink() else image
+    return image.resolve() if isinstance(image, Path) and image.is_symlink() else image
 
 
 def append_edit(connection: Connection, edit: Edit, state: SessionState) -> None:

@@ -18,7 +18,10 @@ from ars_web.datasets.cluster import Cluster, checked_executor, cluster_at, conn
 from ars_web.datasets.jobs import partial_folder, run_export
 from ars_web.datasets.options import ExportOptions
 from ars_web.datasets.plan import ExportPlan, plan_export
+from ars_web.datasets.store_export import plan_stored_export, run_stored_export
+from ars_web.datasets.store_worker import partial_of
 from ars_web.errors import ArsError, BadFile, BadInput, Cancelled, StoreError
+from ars_web.recordings.stores import store_folder
 from ars_web.sessions.model import SessionSnapshot
 
 Make = Callable[..., SessionSnapshot]
@@ -34,10 +37,12 @@ def faults(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def running(dask_cluster: ModuleType, faults: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator:
+def running(
+    dask_cluster: ModuleType, s3: dict[str, str], faults: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator:
     """A cluster of two workers; a shard is given up when three of them died at it."""
     preload = Path(__file__).parents[1] / "faulty_worker.py"
-    told = {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "2", "FAULTS": str(faults)}
+    told = {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "2", "FAULTS": str(faults), **s3}
     with dask_cluster.running_cluster(tmp_path_factory.mktemp("cluster") / "own", told) as cluster:
         for name in ("first", "second"):
             cluster.start(name, "--preload", str(preload))
@@ -114,6 +119,37 @@ def test_a_worker_killed_in_the_middle_costs_its_shard_and_nothing_else(
     run_export(plan, cluster=running.cluster, on_progress=kill)
     assert len(killed) == 2
     assert tree(tmp_path / "there") == tree(tmp_path / "here")
+    until(running, lambda names: len(names) == 2)
+
+
+@pytest.mark.parametrize("kill", [False, True])
+def test_the_files_on_a_store_are_those_of_a_local_export(
+    running, faults: Path, make_snapshot: Make, tmp_path: Path, kill: bool
+) -> None:
+    snapshot, target = make_snapshot(10), store_folder(f"s3://bucket/{tmp_path.name}/set")
+    run_export(plan_of(snapshot, out=tmp_path / "here", format="coco"))
+    options = ExportOptions()
+    plan = plan_stored_export([snapshot], format="coco", options=options, frames_per_shard=2)
+    shard = partial_of(target).below("shards/00001")
+    killed: list[int] = []
+    if kill:
+        (faults / "hold-1").touch()
+
+    def disturb(done: int, total: int) -> None:
+        if kill and done == 8 and not killed:
+            wait_for(lambda: shard.names() != [])
+            for name in ("first", "second"):
+                process = running.process_of(name)
+                process.send_signal(signal.SIGKILL)
+                killed.append(process.pid)
+            (faults / "hold-1").unlink()
+
+    run_stored_export(plan, target, cluster=running.cluster, on_progress=disturb)
+    assert len(killed) == (2 if kill else 0)
+    files = (path for path in (tmp_path / "here").rglob("*") if path.is_file())
+    here = {path.relative_to(tmp_path / "here").as_posix(): path.read_bytes() for path in files}
+    assert {name: target.read(name) for name in target.names()} == here
+    assert partial_of(target).names() == []
     until(running, lambda names: len(names) == 2)
 
 
