@@ -44,6 +44,11 @@ install_import_hook(
             "visual_hull",
             "hull_box",
             "mesh_silhouette",
+            "shape_stack",
+            "shape_occlusion",
+            "instance_masks",
+            "run_lengths",
+            "hidden_points",
         )
     ],
     "beartype.beartype",
