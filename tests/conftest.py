@@ -55,6 +55,11 @@ install_import_hook(
             "two_sided",
             "flat_mesh",
             "box_mesh",
+            "shape_stack",
+            "shape_occlusion",
+            "instance_masks",
+            "run_lengths",
+            "hidden_points",
         )
     ],
     "beartype.beartype",

@@ -168,7 +168,8 @@ def find_sides(T_world_camera: Array, parting: Array, sides: Array) -> None:
 @part
 def may_hide(c: int, b: int, depth: Array, sides: Array) -> bool:
     """Whether c may be before b somewhere: by their depths, and not if the camera is on b's side of a plane between."""
-    return depth[c, 0] < depth[b, 1] and sides[b, c] >= 0 and sides[c, b] <= 0
+    # Depths that are equal but for rounding tell nothing.
+    return depth[c, 0] <= depth[b, 1] + 1e-12 * abs(depth[b, 1]) and sides[b, c] >= 0 and sides[c, b] <= 0
 
 
 @part
@@ -354,8 +355,8 @@ def cover(pieces: Array, start: int, end: int, grid: Grid, turns: Array, covered
 @part
 def sides_of(P: Array, i: int, j: int, m: int, sides: Array) -> float:
     """The planes (3, 3) through the camera and a triangle's sides: sides[s] . (x, y, 1) is at least 0 for all three
-    where the ray or its opposite meets the triangle. Their sum over the answer's size is the inverse depth; the answer is
-    below 0 where the triangle is turned to the camera.
+    where the ray or its opposite meets the triangle. Their sum over the answer's size is the inverse depth; the answer
+    is below 0 where the triangle is turned to the camera.
 
     Of two triangles with a side in common each ray beside it is in one: what is told of the side by one is what is told
     by the other with the sign turned, to the last bit.

@@ -22,6 +22,9 @@ BOX_FACES: Int[np.ndarray, "12 3"] = np.array(
 )
 """Of a box's corners in the order of box.CORNER_SIGNS, counter-clockwise as seen from outside."""
 
+TOUCHING = 1e-12
+"""Of how far the shapes are from the world's origin: what is no further apart than this lies in each other, perhaps."""
+
 DIRECTIONS = 200
 """All round, in which shapes that are apart are looked for a plane between them."""
 
@@ -43,9 +46,9 @@ class ShapeStack:
     faces: Int[np.ndarray, "f 3"]
     planes: Float[np.ndarray, "f 4"]
     edges: Int[np.ndarray, "e 4"]
-    first_vertex: Int[np.ndarray, "b+1"]
-    first_face: Int[np.ndarray, "b+1"]
-    first_edge: Int[np.ndarray, "b+1"]
+    first_vertex: Int[np.ndarray, "_"]
+    first_face: Int[np.ndarray, "_"]
+    first_edge: Int[np.ndarray, "_"]
     Ts_world_bound: Float[np.ndarray, "b 4 4"]
     halves: Float[np.ndarray, "b 3"]
 
@@ -72,7 +75,7 @@ class ShapeStack:
         for first in range(b):
             gaps = low - high[:, first, None]
             best = np.argmax(gaps, axis=0)
-            apart = gaps[best, np.arange(b)] >= 0
+            apart = gaps[best, np.arange(b)] > TOUCHING * np.abs(places).max()
             apart[first] = False
             planes[first, apart, :3] = normals[best[apart]]
             planes[first, apart, 3] = -(high[best, first] + low[best, np.arange(b)])[apart] / 2
