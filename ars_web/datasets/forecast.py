@@ -92,14 +92,15 @@ def _images(plan: ExportPlan) -> tuple[ImageCounts, int, int]:
     counts, size, new = {"linked": 0, "copied": 0, "encoded": 0}, 0, 0
     frames, options = plan.frames, plan.options
     if options.images != "none":
-        only_jpeg = writer_of(plan.format).only_jpeg
+        writer = writer_of(plan.format)
         device = cache(_device)
         here = device(str(plan.out.parent))
         columns = (frames.session.tolist(), frames.camera_id.tolist(), frames.stamps[:, 0].tolist())
         for source, stem, session, camera_id, bytes_ in zip(frames.sources, frames.stems, *columns, strict=True):
-            target = image_name(stem, source, only_jpeg=only_jpeg)
+            target = image_name(stem, source, only_jpeg=writer.only_jpeg)
             how = placement(source, target, camera=plan.sessions[session].cameras[camera_id], images=options.images)
-            if how == "linked" and device(source.rpartition("/")[0]) != here:
+            # Images that the writer puts into its own files are written once more.
+            if how == "linked" and (writer.image_folder is None or device(source.rpartition("/")[0]) != here):
                 how = "copied"
             counts[how] += 1
             size += bytes_
