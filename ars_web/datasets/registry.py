@@ -1,6 +1,6 @@
 """The dataset formats by name. Adding one is one file and one line here."""
 
-from ars_web.datasets.writers import ars, coco, cvat, cvat_video, parquet, voc, webdataset, yolo
+from ars_web.datasets.writers import ars, coco, cvat, cvat_video, parquet, tfrecord, voc, webdataset, yolo
 from ars_web.datasets.writers.writer import Writer
 from ars_web.errors import BadInput
 
@@ -16,6 +16,7 @@ WRITERS: dict[str, Writer] = {
         cvat_video.WRITER,
         parquet.WRITER,
         webdataset.WRITER,
+        tfrecord.WRITER,
     )
 }
 """In the order in which they are offered."""

@@ -1,6 +1,6 @@
 """How each format is read back. Adding one is one file and one line here."""
 
-from ars_web.datasets.readback import ars, coco, cvat, parquet, voc, webdataset, yolo
+from ars_web.datasets.readback import ars, coco, cvat, parquet, tfrecord, voc, webdataset, yolo
 from ars_web.datasets.readback.reader import Reader
 from ars_web.errors import BadInput
 
@@ -16,6 +16,7 @@ READERS: dict[str, Reader] = {
         cvat.TRACKS,
         parquet.READER,
         webdataset.READER,
+        tfrecord.READER,
     )
 }
 """By the format's key in `datasets/registry.py`."""
