@@ -213,6 +213,12 @@ def main() -> None:
             ("coco", "link", "labels, outlines, visible"),
             ("voc", "link", "labels, visible"),
             ("ars", "link", "labels"),
+            ("cvat", "link", "labels, visible"),
+            ("cvat-polygons", "link", "labels, outlines, visible"),
+            ("cvat-video", "link", "labels, visible"),
+            ("parquet", "link", "labels, outlines, keypoints, visible"),
+            ("webdataset", "link", "labels, outlines, keypoints, visible; images in it"),
+            ("tfrecord", "link", "labels; images in it"),
         ):
             seconds = export(snapshot, folder / f"ours-{kind}-{images}", kind, images)
             line(f"ours: {kind.upper()}, whole export, images: {images}", seconds, f"{computed} computed")

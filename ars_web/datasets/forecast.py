@@ -100,7 +100,9 @@ def _images(plan: ExportPlan) -> tuple[ImageCounts, int, int]:
         for source, stem, session, camera_id, bytes_ in zip(frames.sources, frames.stems, *columns, strict=True):
             target = image_name(stem, source, only_jpeg=writer.only_jpeg, only_png=writer.only_png)
             how = placement(source, target, camera=plan.sessions[session].cameras[camera_id], images=options.images)
-            if how == "linked" and (is_address(source) or device(source.rpartition("/")[0]) != here):
+            # Images that the writer puts into its own files are written once more.
+            stays = writer.image_folder is not None and not is_address(source)
+            if how == "linked" and not (stays and device(source.rpartition("/")[0]) == here):
                 how = "copied"
             counts[how] += 1
             size += bytes_

@@ -154,6 +154,7 @@ LABEL_FUNCTIONS: dict[str, LabelFunction] = {
         ),
         LabelFunction("silhouette", "Silhouette", "the border of what is in the image, holes included", _silhouette),
         LabelFunction("rectangle", "Turned rectangle", "the rectangle of the smallest area", _rectangle),
+        LabelFunction("mask", "Visible mask", "the pixels in which no nearer object is seen", _mask),
         LabelFunction(
             "keypoints", "Keypoints", "the object's named points, and which of them are in sight", _keypoints
         ),

@@ -56,6 +56,14 @@ def assign(frame_counts: Sequence[int], choice: SplitChoice) -> Int[np.ndarray, 
     return np.concatenate(parts)
 
 
+def places_in_splits(split: Int[np.ndarray, "n"]) -> Int[np.ndarray, "n"]:
+    """The place of each frame among those of its split, from 0; `split` are split numbers."""
+    places = np.zeros(len(split), dtype=np.int64)
+    for number in range(len(SPLITS)):
+        places[split == number] = np.arange(int((split == number).sum()))
+    return places
+
+
 def _blocks(frames: int) -> int:
     return min(frames, max(FEWEST_BLOCKS, min(BLOCKS, frames // BLOCK_FRAMES)))
 

@@ -23,7 +23,7 @@ from ars_web.datasets.planned import ExportPlan
 from ars_web.datasets.registry import writer_of
 from ars_web.datasets.report import ShardReport
 from ars_web.datasets.samples import outlines_of_shapes
-from ars_web.datasets.splits import SPLITS
+from ars_web.datasets.splits import SPLITS, places_in_splits
 from ars_web.datasets.writers.writer import Shard, Writer
 from ars_web.errors import Cancelled
 
@@ -169,6 +169,8 @@ def _shard(plan: ExportPlan, number: int, images: Path) -> tuple[Shard, dict[str
             sessions=plan.sessions,
             options=plan.options,
             splits=splits,
+            places=places_in_splits(frames.split[:stop])[start:],
+            split_sizes={split: size for i, split in enumerate(SPLITS) if (size := int((frames.split == i).sum()))},
             stems=stems,
             image_names=names,
             image_files=files if has_images else (),
@@ -206,7 +208,9 @@ def identity(name: str, source: str) -> str:
 
 def _place_images(plan: ExportPlan, number: int, shard: Shard, check: Callable[[], None]) -> None:
     start, _ = plan.shards[number]
-    frames, cameras = plan.frames, shard.session.cameras
+    frames, cameras, images = plan.frames, shard.session.cameras, plan.options.images
+    # What is only read, to be put into other files, need not be copied before.
+    images = "link" if images == "copy" and writer_of(plan.format).image_folder is None else images
     for folder in sorted({file.parent for file in shard.image_files}):
         folder.mkdir(parents=True, exist_ok=True)
     stamps: list[tuple[int, int]] = list(map(tuple, frames.stamps[start : start + len(shard.stems)].tolist()))
@@ -217,5 +221,5 @@ def _place_images(plan: ExportPlan, number: int, shard: Shard, check: Callable[[
             str(target),
             camera=cameras[int(frames.camera_id[start + i])],
             stamp=stamp,
-            images=plan.options.images,
+            images=images,
         )

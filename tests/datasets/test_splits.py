@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ars_web.datasets.options import SplitChoice
-from ars_web.datasets.splits import BLOCKS, apportion, assign
+from ars_web.datasets.splits import BLOCKS, apportion, assign, places_in_splits
 from ars_web.errors import BadInput
 
 
@@ -86,3 +86,8 @@ def test_apportioning_gives_every_unit_away_once(units: int, cuts: tuple[int, in
         assert (count == 0) if share == 0 else abs(count - share * units) <= positive
         if share > 0 and units >= positive:
             assert count >= 1
+
+
+def test_places_count_within_each_split() -> None:
+    assert places_in_splits(np.array([0, 0, 1, 0, 2, 1, 0])).tolist() == [0, 1, 0, 2, 0, 1, 3]
+    assert places_in_splits(np.zeros(0, dtype=np.int64)).tolist() == []

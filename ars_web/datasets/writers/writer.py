@@ -25,6 +25,8 @@ class Shard:
         sessions: all of the dataset's, for ids that span them.
         options: of the export.
         splits: of each frame, `train`, `val` or `test`.
+        places: (n,) of each frame among those of its split, in all of the dataset, from 0.
+        split_sizes: how many frames of all of the dataset are in each split; those without any are left out.
         stems: of each frame's files.
         image_names: of each frame's image file, in the folder that the writer's `image_folder` says.
         image_files: where those lie while the shard is written, for writers that put their bytes into other files;
@@ -49,6 +51,8 @@ class Shard:
     sessions: Sequence[PlannedSession]
     options: ExportOptions
     splits: Sequence[str]
+    places: Int[np.ndarray, "n"]
+    split_sizes: Mapping[str, int]
     stems: Sequence[str]
     image_names: Sequence[str]
     image_files: Sequence[Path]
