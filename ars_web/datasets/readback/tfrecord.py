@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-import google_crc32c
 import numpy as np
 from jaxtyping import Float
 
@@ -32,6 +31,8 @@ def records_of(path: Path) -> Iterator[bytes]:
 
 
 def _masked(content: bytes) -> bytes:
+    import google_crc32c
+
     crc = google_crc32c.value(content)
     turned = (crc >> 15 | crc << 17) & 0xFFFFFFFF
     return ((turned + 0xA282EAD8) % 2**32).to_bytes(4, "little")

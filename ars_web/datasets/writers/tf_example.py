@@ -8,15 +8,23 @@ each list being `repeated value = 1`, numbers packed; from tensorflow/core/examp
 their names, so that equal examples have equal bytes.
 """
 
+import importlib.util
 from collections.abc import Iterable, Mapping
 
-import google_crc32c
 import numpy as np
 from jaxtyping import Float
+
+from ars_web.errors import BadInput
 
 _BYTES_LIST, _FLOAT_LIST, _INT64_LIST = 1, 2, 3
 
 _MASK_DELTA = 0xA282EAD8
+
+
+def check_crc32c() -> None:
+    """Raises BadInput where google-crc32c is not installed."""
+    if importlib.util.find_spec("google_crc32c") is None:
+        raise BadInput("format 'tfrecord' needs google-crc32c, which is not installed: pip install 'ars-web[tfrecord]'")
 
 
 def bytes_feature(values: Iterable[bytes]) -> bytes:
@@ -51,6 +59,9 @@ def record(content: bytes) -> tuple[bytes, bytes, bytes]:
 
 def _masked_crc(content: bytes) -> bytes:
     """CRC-32C, turned right by 15 bits and moved, so that checksums of checksums differ (tensorflow/core/lib/hash)."""
+    # An extra, which only those who write TFRecords need.
+    import google_crc32c
+
     crc = google_crc32c.value(content)
     masked = (((crc >> 15) | (crc << 17)) + _MASK_DELTA) & 0xFFFFFFFF
     return masked.to_bytes(4, "little")

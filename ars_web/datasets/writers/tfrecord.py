@@ -22,7 +22,14 @@ from ars_web.datasets.writers.sample_files import (
     split_sizes,
     write_samples,
 )
-from ars_web.datasets.writers.tf_example import bytes_feature, example, float_feature, int64_feature, record
+from ars_web.datasets.writers.tf_example import (
+    bytes_feature,
+    check_crc32c,
+    example,
+    float_feature,
+    int64_feature,
+    record,
+)
 from ars_web.datasets.writers.voc import TRUNCATED_BEYOND
 from ars_web.datasets.writers.writer import Dataset, FileDigests, Shard, Writer
 
@@ -102,6 +109,7 @@ def _quoted(text: str) -> str:
 
 
 def _losses(plan: ExportPlan) -> Sequence[str]:
+    check_crc32c()
     if plan.options.images != "none":
         return ()
     return ("the records hold labels alone, because no images are exported; TensorFlow's own reader wants images",)
