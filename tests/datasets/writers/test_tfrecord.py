@@ -1,6 +1,7 @@
 """TFRecords by protobuf's own parser, with TensorFlow's messages described here, and checksums by the definition."""
 
 import hashlib
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -9,14 +10,14 @@ import numpy as np
 import pytest
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 
-from ars_web.datasets.jobs import plan_export, run_export
+from ars_web.datasets.jobs import partial_folder, plan_export, run_export
 from ars_web.datasets.options import ExportOptions
 from ars_web.datasets.readback.comparison import compare
 from ars_web.datasets.readback.tfrecord import features_of, records_of
 from ars_web.datasets.writers import sample_files
 from ars_web.datasets.writers.tf_example import bytes_feature, example, float_feature, int64_feature, record
 from ars_web.datasets.writers.tfrecord import label_map
-from ars_web.errors import BadFile
+from ars_web.errors import BadFile, BadInput
 from ars_web.sessions.model import SessionSnapshot
 
 Make = Callable[..., SessionSnapshot]
@@ -220,3 +221,13 @@ def test_damage_is_found(make_snapshot: Make, tmp_path: Path) -> None:
     path.write_bytes(b"".join(record(b"\x08\x01")))
     with pytest.raises(BadFile, match=r"record 0 is no tf\.train\.Example"):
         compare(plan, plan.out)
+
+
+def test_without_its_checksums_nothing_is_begun(
+    make_snapshot: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "google_crc32c", None)
+    with pytest.raises(BadInput, match=r"pip install 'ars-web\[tfrecord\]'"):
+        plan_export([make_snapshot(2)], format="tfrecord", options=ExportOptions.model_validate({}), out=tmp_path / "d")
+    assert not (tmp_path / "d").exists()
+    assert not partial_folder(tmp_path / "d").exists()
