@@ -16,7 +16,7 @@ from ars_web.geometry.symmetry import Symmetry
 SECONDS_PER_FRAME = {"none": 0.0003, "link": 0.0005, "copy": 0.001, "rectify": 0.02}
 """Rough cost on one core, by where the images come from: what shards are cut by, never what is promised."""
 
-SECONDS_PER_MASKED_FRAME = 0.02
+SECONDS_PER_MASKED_FRAME = 0.05
 """The same of a frame whose objects' masks are written."""
 
 

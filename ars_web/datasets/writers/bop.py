@@ -15,6 +15,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 from numba import njit
 
 from ars_web.datasets.planned import ExportPlan
+from ars_web.datasets.shapes import PosedShapes
 from ars_web.datasets.writers.bop_info import BopInfo, info_of_outlines
 from ars_web.datasets.writers.bop_masks import write_masks
 from ars_web.datasets.writers.bop_models import write_models
@@ -182,21 +183,21 @@ def _put_box(buffer: Buffer, place: int, box: Int[np.ndarray, "4"]) -> int:
     return place
 
 
-def _cameras(shard: Shard) -> list[str]:
+def cameras(shapes: PosedShapes, images: Int[np.ndarray, "n"]) -> list[str]:
     """The lines of `scene_camera.json`, one a frame. There is no depth to scale."""
     matrices = {
         camera_id: "[" + ", ".join(repr(float(v)) for v in camera.K.ravel()) + "]"
-        for camera_id, camera in shard.shapes.cameras.items()
+        for camera_id, camera in shapes.cameras.items()
     }
-    Ts_camera_world = rigid_transform.invert(shard.shapes.Ts_world_camera)
+    Ts_camera_world = rigid_transform.invert(shapes.Ts_world_camera)
     # Adding zero turns a negative zero, which rounding leaves, into one without a sign.
     rotations = (np.round(Ts_camera_world[:, :3, :3].reshape(-1, 9), 9) + 0.0).tolist()
     translations = (np.round(Ts_camera_world[:, :3, 3] * 1000.0, 5) + 0.0).tolist()
     return [
-        f'  "{shard.first + i}": {{"cam_K": {matrices[camera_id]}, "cam_R_w2c": [{_listed(R, 9)}],'
+        f'  "{image}": {{"cam_K": {matrices[camera_id]}, "cam_R_w2c": [{_listed(R, 9)}],'
         f' "cam_t_w2c": [{_listed(t, 5)}], "depth_scale": 1.0}}'
-        for i, (camera_id, R, t) in enumerate(
-            zip(shard.shapes.camera_ids.tolist(), rotations, translations, strict=True)
+        for image, camera_id, R, t in zip(
+            images.tolist(), shapes.camera_ids.tolist(), rotations, translations, strict=True
         )
     ]
 
@@ -222,14 +223,15 @@ def _write(shard: Shard, files: Path, fragments: Path) -> FileDigests:
     if shard.options.masks == "write":
         info = write_masks(shard, info, files)
     Ts = Ts_camera_box(shard.shapes)
-    cameras, of_frame = _cameras(shard), np.array(shard.splits)
+    of_frame = np.array(shard.splits)
     images = shard.first + np.arange(len(of_frame))
+    lines_of_cameras = cameras(shard.shapes, images)
     lines = [f"{stem} {name}\n" for stem, name in zip(shard.stems, shard.identities, strict=True)]
     (fragments / "frames.txt").write_text("".join(lines), encoding="utf-8")
     for split in sorted(set(shard.splits)):
         rows = np.flatnonzero(of_frame == split)
         for name, content in (
-            ("scene_camera", ",\n".join([cameras[row] for row in rows.tolist()]).encode()),
+            ("scene_camera", ",\n".join([lines_of_cameras[row] for row in rows.tolist()]).encode()),
             ("scene_gt", poses(Ts[rows], shard.keep[rows], ids, images[rows]).data),
             ("scene_gt_info", infos(info, shard.keep, images, rows).data),
         ):

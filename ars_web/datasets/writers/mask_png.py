@@ -13,7 +13,7 @@ from jaxtyping import Bool
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
 _LEVEL = 1
-"""Of zlib's packing: masks are small at the fastest."""
+"""Of zlib's packing of what is drawn: the fastest."""
 
 _BASE = 65521
 """Of Adler's checksum (RFC 1950)."""
@@ -40,7 +40,8 @@ def mask_png(mask: Bool[np.ndarray, "k l"], *, row: int, column: int, width: int
 
 @lru_cache(maxsize=4096)
 def _blanks(rows: int, width: int) -> bytes:
-    packer = zlib.compressobj(_LEVEL, zlib.DEFLATED, -zlib.MAX_WBITS)
+    # As small as can be, since it is done once.
+    packer = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS)
     return packer.compress(bytes(rows * (width + 1))) + packer.flush(zlib.Z_FULL_FLUSH)
 
 
