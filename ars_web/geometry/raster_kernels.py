@@ -325,13 +325,13 @@ def contour(
 
 
 @part
-def cover(pieces: Array, start: int, end: int, grid: Grid, turns: Array, covered: Array) -> None:
-    """Mark in `covered` those of a grid's rays that the contour in `pieces` from `start` to `end` runs round."""
+def cover(pieces: Array, grid: Grid, turns: Array, covered: Array) -> None:
+    """Mark in `covered` those of a grid's rays that a contour runs round."""
     rows, columns = grid.rows, grid.columns
     wide = columns + 1
     turns[: rows * wide] = 0
     by_du, by_dv = 1.0 / grid.du, 1.0 / grid.dv
-    for k in range(start, end):
+    for k in range(len(pieces)):
         column, row = (pieces[k, 0] - grid.u) * by_du, (pieces[k, 1] - grid.v) * by_dv
         end_column, end_row = (pieces[k, 2] - grid.u) * by_du, (pieces[k, 3] - grid.v) * by_dv
         turn = 1
@@ -346,10 +346,10 @@ def cover(pieces: Array, start: int, end: int, grid: Grid, turns: Array, covered
             place = min(max(column + (i - row) * slope, 0.0), float(columns))
             turns[i * wide + math.ceil(place)] += turn
     for i in range(rows):
-        sum_ = 0
+        around = 0
         for j in range(columns):
-            sum_ += turns[i * wide + j]
-            covered[i * columns + j] |= sum_ != 0
+            around += turns[i * wide + j]
+            covered[i * columns + j] |= around != 0
 
 
 @part
@@ -653,7 +653,7 @@ def visible_shares(
                     own[:size], other[:size] = 0.0, 0.0
                     draw_shape(shapes, placed, b, near, grid, xs, ys, own)
                 if ends[b] > starts[b]:
-                    cover(pieces, starts[b], ends[b], grid, turns, seen)
+                    cover(pieces[starts[b] : ends[b]], grid, turns, seen)
                 else:
                     for ray in range(size):
                         seen[ray] = own[ray] > 0.0
@@ -661,7 +661,7 @@ def visible_shares(
                     c = others[k]
                     # A shape round the camera hides nothing: what it stands for is no solid block where the camera is.
                     if parted[k]:
-                        cover(pieces, starts[c], ends[c], grid, turns, hidden)
+                        cover(pieces[starts[c] : ends[c]], grid, turns, hidden)
                     elif placed.kinds[c] != ROUND:
                         draw_shape(shapes, placed, c, near, grid, xs, ys, other)
                 met, left = 0, 0
