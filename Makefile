@@ -6,6 +6,8 @@
 #   make format   let ruff put the format right
 
 PYTHON ?= python3
+# How the tests are spread: two processes, each file in one of them. `make test PROCESSES=` runs them in one.
+PROCESSES ?= -n 2 --dist loadgroup
 BIN := .venv/bin
 PINNED := pyproject.toml setup.py constraints.txt .ci/environment
 
@@ -16,7 +18,7 @@ demo: .venv/runtime.stamp
 	$(BIN)/ars-web demo
 
 test: .venv/dev.stamp
-	ARS_WEB_CHROMIUM="$$(.ci/chromium)" && export ARS_WEB_CHROMIUM && $(BIN)/python -m pytest $(ARGS)
+	ARS_WEB_CHROMIUM="$$(.ci/chromium)" && export ARS_WEB_CHROMIUM && $(BIN)/python -m pytest $(PROCESSES) $(ARGS)
 
 check: .venv/dev.stamp
 	$(BIN)/ruff format --check .
