@@ -233,34 +233,13 @@ def test_a_session_in_use_is_not_taken_for_an_exported_one(
 
 
 TAMPERINGS = {
-    "not a database": (
-        None,
-        "cannot be used: .*no session database",
-    ),
-    "a trigger": (
-        "CREATE TRIGGER t AFTER UPDATE ON session BEGIN DELETE FROM box; END",
-        "it has a trigger 't'",
-    ),
-    "a view": (
-        "CREATE VIEW v AS SELECT * FROM box",
-        "it has a view 'v'",
-    ),
-    "a table": (
-        "CREATE TABLE more (x)",
-        "it has a table 'more'",
-    ),
-    "no table": (
-        "DROP TABLE skipped",
-        "no such table",
-    ),
-    "no column": (
-        "ALTER TABLE camera DROP COLUMN fx",
-        "no such column",
-    ),
-    "a newer schema": (
-        "UPDATE alembic_version SET version_num = '9999'",
-        "newer ars-web",
-    ),
+    "not a database": (None, "cannot be used: .*no session database"),
+    "a trigger": ("CREATE TRIGGER t AFTER UPDATE ON session BEGIN DELETE FROM box; END", "it has a trigger 't'"),
+    "a view": ("CREATE VIEW v AS SELECT * FROM box", "it has a view 'v'"),
+    "a table": ("CREATE TABLE more (x)", "it has a table 'more'"),
+    "no table": ("DROP TABLE skipped", "no such table"),
+    "no column": ("ALTER TABLE camera DROP COLUMN fx", "no such column"),
+    "a newer schema": ("UPDATE alembic_version SET version_num = '9999'", "newer ars-web"),
     "a place on this machine": (
         "UPDATE frame SET image = '/etc/passwd' WHERE idx = 1",
         "frame 'cam1/00001.jpg' lies outside",
@@ -273,50 +252,20 @@ TAMPERINGS = {
         "UPDATE frame SET name = x'00' WHERE idx = 1",
         "frame.name holds a value that is no text",
     ),
-    "a gap in the frames": (
-        "UPDATE frame SET idx = 9 WHERE idx = 3",
-        "not numbered from 0 without gaps",
-    ),
-    "no frames": (
-        "DELETE FROM frame",
-        "a row of mask refers to a row of frame that is not there",
-    ),
+    "a gap in the frames": ("UPDATE frame SET idx = 9 WHERE idx = 3", "not numbered from 0 without gaps"),
+    "no frames": ("DELETE FROM frame", "a row of mask refers to a row of frame that is not there"),
     "a pose that is none": (
         "UPDATE frame SET pose = zeroblob(96) WHERE idx = 2",
         "1 poses are no rigid transforms, the first that of frame 2",
     ),
-    "a pose cut short": (
-        "UPDATE frame SET pose = x'00' WHERE idx = 2",
-        "a stored pose is damaged",
-    ),
-    "a camera that is none": (
-        "UPDATE camera SET fx = -1",
-        "focal lengths must be positive",
-    ),
-    "a camera's numbers are text": (
-        "UPDATE camera SET fx = 'wide'",
-        "camera.fx holds a value",
-    ),
-    "no session": (
-        "DELETE FROM session",
-        "the row that describes the session is gone",
-    ),
-    "a class that is gone": (
-        "DELETE FROM object_class WHERE id = 1",
-        "refers to a row of object_class",
-    ),
-    "a box moved in the table": (
-        "UPDATE box SET size_x = 7",
-        "the log and the tables differ in box 1",
-    ),
-    "a box locked in the table": (
-        "UPDATE box SET locked = 1",
-        "the log and the tables differ in box 1",
-    ),
-    "a lock that is none": (
-        "UPDATE box SET locked = 'yes'",
-        "box.locked holds a value that is no integer",
-    ),
+    "a pose cut short": ("UPDATE frame SET pose = x'00' WHERE idx = 2", "a stored pose is damaged"),
+    "a camera that is none": ("UPDATE camera SET fx = -1", "focal lengths must be positive"),
+    "a camera's numbers are text": ("UPDATE camera SET fx = 'wide'", "camera.fx holds a value"),
+    "no session": ("DELETE FROM session", "the row that describes the session is gone"),
+    "a class that is gone": ("DELETE FROM object_class WHERE id = 1", "refers to a row of object_class"),
+    "a box moved in the table": ("UPDATE box SET size_x = 7", "the log and the tables differ in box 1"),
+    "a box locked in the table": ("UPDATE box SET locked = 1", "the log and the tables differ in box 1"),
+    "a lock that is none": ("UPDATE box SET locked = 'yes'", "box.locked holds a value that is no integer"),
     "a class given a size in the table": (
         "UPDATE object_class SET default_size = '[1, 2, 3]' WHERE id = 0",
         "differ in class 0",
@@ -337,34 +286,16 @@ TAMPERINGS = {
         """UPDATE edit SET changes = replace(changes, '"default_size":null', '"default_size":[1,"a",2]')""",
         "an entry of the session's log",
     ),
-    "a class renamed in the table": (
-        "UPDATE object_class SET name = 'x' WHERE id = 0",
-        "differ in class 0",
-    ),
+    "a class renamed in the table": ("UPDATE object_class SET name = 'x' WHERE id = 0", "differ in class 0"),
     "a colour that is none": (
         """UPDATE edit SET changes = replace(changes, '"#', '"url(#') WHERE revision = 1""",
         "an entry of the session's log",
     ),
-    "a hole in the log": (
-        "DELETE FROM edit WHERE revision = 3",
-        "refers to a row of edit|missing",
-    ),
-    "a log that is longer": (
-        "UPDATE session SET revision = 2",
-        "does not lead to revision 2",
-    ),
-    "a log of nonsense": (
-        "UPDATE edit SET changes = '[1]' WHERE revision = 2",
-        "an entry of the session's log",
-    ),
-    "a beginning of nonsense": (
-        "UPDATE session SET origin = '{}'",
-        "the state that the session's log starts from",
-    ),
-    "a date that is none": (
-        "UPDATE edit SET at = 'yesterday'",
-        "holds 'yesterday' where a moment should be",
-    ),
+    "a hole in the log": ("DELETE FROM edit WHERE revision = 3", "refers to a row of edit|missing"),
+    "a log that is longer": ("UPDATE session SET revision = 2", "does not lead to revision 2"),
+    "a log of nonsense": ("UPDATE edit SET changes = '[1]' WHERE revision = 2", "an entry of the session's log"),
+    "a beginning of nonsense": ("UPDATE session SET origin = '{}'", "the state that the session's log starts from"),
+    "a date that is none": ("UPDATE edit SET at = 'yesterday'", "holds 'yesterday' where a moment should be"),
     "a hull that is gone": (
         "UPDATE box SET hull = NULL; DELETE FROM hull",
         "a box of the log has hull [0-9a-f]{64}, which is not there",
@@ -381,18 +312,9 @@ TAMPERINGS = {
         f"UPDATE hull SET faces = x'{'09000000' * 12}'",
         "hull .* is damaged: .*whole numbers from 0 to 3",
     ),
-    "a hull cut short": (
-        "UPDATE hull SET faces = x'ff0000'",
-        "hull .* is damaged",
-    ),
-    "a hull that is text": (
-        "UPDATE hull SET vertices = 'round'",
-        "hull.vertices holds a value that is no blob",
-    ),
-    "a hull's making that is none": (
-        "UPDATE box SET hull_options = '{}'",
-        "how a box was made cannot be read",
-    ),
+    "a hull cut short": ("UPDATE hull SET faces = x'ff0000'", "hull .* is damaged"),
+    "a hull that is text": ("UPDATE hull SET vertices = 'round'", "hull.vertices holds a value that is no blob"),
+    "a hull's making that is none": ("UPDATE box SET hull_options = '{}'", "how a box was made cannot be read"),
     "a hull's making changed in the table": (
         "UPDATE box SET hull_options = replace(hull_options, 'upright', 'free')",
         "the log and the tables differ in box 2",
@@ -417,10 +339,7 @@ TAMPERINGS = {
         f"UPDATE mesh SET faces = x'{'000000000100000002000000' * 2}'",
         "mesh .* is damaged: .*must be closed",
     ),
-    "a mesh cut short": (
-        "UPDATE mesh SET faces = x'ff0000'",
-        "mesh .* is damaged",
-    ),
+    "a mesh cut short": ("UPDATE mesh SET faces = x'ff0000'", "mesh .* is damaged"),
     "a mesh in a unit that is none": (
         "UPDATE mesh SET unit = 'ells'",
         "mesh .* is damaged: a mesh's unit must be one of",
@@ -479,14 +398,8 @@ TAMPERINGS = {
         """UPDATE edit SET changes = replace(changes, '"polygons":[{', '"polygons":[],"more":[{')""",
         "an entry of the session's log cannot be read: an outline needs at least one polygon",
     ),
-    "another next mask": (
-        "UPDATE session SET next_mask_id = 1",
-        "differ in next_mask_id",
-    ),
-    "another next id": (
-        "UPDATE session SET next_box_id = 1",
-        "differ in next_box_id",
-    ),
+    "another next mask": ("UPDATE session SET next_mask_id = 1", "differ in next_mask_id"),
+    "another next id": ("UPDATE session SET next_box_id = 1", "differ in next_box_id"),
 }
 
 
