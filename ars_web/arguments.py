@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from pydantic import ValidationError
 
     from ars_web.datasets.options import ExportOptions
+    from ars_web.sessions.object_mesh import SourcedMesh
     from ars_web.settings import Settings
 
 SESSIONS = Path("sessions")
@@ -94,6 +95,28 @@ AllowedHosts = Annotated[
     typer.Option("--allow-host", metavar="NAME", help="A further name the server is reached by; repeatable."),
 ]
 
+# classes and boxes
+BoxId = Annotated[int, typer.Argument(metavar="BOX", help="The box's id.")]
+MeshFile = Annotated[Path | None, typer.Argument(metavar="FILE", help="An obj, ply, glb or stl; none with --remove.")]
+MeshUnit = Annotated[
+    str | None, typer.Option("--unit", metavar="mm|cm|m|in", help="Of the file's numbers. Never guessed.")
+]
+MeshAxes = Annotated[
+    str | None,
+    typer.Option(
+        "--axes", metavar="x,y,z", help="Which axes of the file run along the box's x, y and z, such as x,-z,y."
+    ),
+]
+MeshOrigin = Annotated[
+    str,
+    typer.Option(
+        "--origin",
+        metavar="centre|file",
+        help="What lies at the box's centre: the mesh's middle, or the file's origin.",
+    ),
+]
+Remove = Annotated[bool, typer.Option("--remove", help="Take it away instead.")]
+
 # import
 RecordingPath = Annotated[Path, typer.Argument(metavar="PATH", help="A tracked recording: a folder or a file.")]
 RecordingFormat = Annotated[
@@ -130,6 +153,10 @@ Shape = Annotated[
     Literal["box", "hull", "mesh"] | None,
     typer.Option("--shape", help="What is projected; default: the hull where a box has one, else the box."),
 ]
+Masks = Annotated[
+    Literal["write", "none"] | None,
+    typer.Option("--masks", help="Of bop: two PNG files a label (default), or none, which is much faster."),
+]
 MinVisible = Annotated[
     float | None, typer.Option("--min-visible", metavar="SHARE", help="Drop labels less visible; default 0.")
 ]
@@ -139,6 +166,10 @@ MaxTruncated = Annotated[
 MinArea = Annotated[
     float | None, typer.Option("--min-area-px", metavar="PX", help="Drop labels of smaller area; default 4.")
 ]
+HeadingBins = Annotated[
+    int | None,
+    typer.Option("--heading-bins", metavar="N", help="compass: bins of a turn, 0 for angles; default 18."),
+]
 SplitTrain = Annotated[float | None, typer.Option("--split-train", metavar="SHARE", help="Default 0.8.")]
 SplitVal = Annotated[float | None, typer.Option("--split-val", metavar="SHARE", help="Default 0.2.")]
 SplitTest = Annotated[float | None, typer.Option("--split-test", metavar="SHARE", help="Default 0.")]
@@ -147,11 +178,35 @@ SplitBy = Annotated[
     typer.Option("--split-by", help="Divide runs of frames (default), single frames, or whole sessions."),
 ]
 SplitSeed = Annotated[int | None, typer.Option("--split-seed", metavar="N", help="Default 0.")]
+Check = Annotated[
+    bool,
+    typer.Option("--check", help="Read the set back, and compare each label with the session's; 1 if any differs."),
+]
 # The option is called `sessions` elsewhere; here that name is the sessions folder's.
 Merge = Annotated[
     str | None, typer.Option("--merge", metavar="SESSION,SESSION", help="Further sessions in the same dataset.")
 ]
 Workers = Annotated[int | None, typer.Option("--workers", metavar="N", min=1, help="Processes; default: one a core.")]
+
+
+def read_mesh(
+    file: Path | None, *, unit: str | None, axes: str | None, origin: str, remove: bool
+) -> "tuple[SourcedMesh | None, tuple[str, ...]]":
+    """The mesh that a command is given, or None for none, and what was changed of it, in words.
+
+    Raises:
+        BadInput, BadFile: a file, its unit or its axes are missing, or cannot be; or there is a file to `remove`.
+    """
+    if remove:
+        if file is not None:
+            raise BadInput("--remove takes the mesh away; leave the file out")
+        return None, ()
+    if file is None or unit is None or axes is None:
+        raise BadInput("a mesh needs its file, --unit and --axes, such as: bottle.stl --unit mm --axes x,y,z")
+    from ars_web.sessions.mesh_reading import object_from_file
+
+    # By its name alone: that is what the session keeps.
+    return object_from_file(file, name=file.name, unit=unit, axes=axes, origin=origin)
 
 
 def comma_separated(text: str | None, option: str) -> list[str]:

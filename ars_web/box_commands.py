@@ -1,6 +1,7 @@
 """The commands of `ars-web boxes`: a session's virtual boxes in, out, and made from outlines."""
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,11 +14,14 @@ from ars_web.terminal import note, print_json, print_table, write_json
 if TYPE_CHECKING:
     from ars_web.geometry.visual_hull import VisualHull
     from ars_web.sessions.model import VirtualBox
+    from ars_web.sessions.object_mesh import SourcedMesh
 
 AUTHOR = "cli"
 """Who the edit log says made the changes of this program."""
 
-app = typer.Typer(help="A session's virtual boxes: in and out as JSON, or made from masks.", rich_markup_mode=None)
+app = typer.Typer(
+    help="A session's virtual boxes: in and out as JSON, made from masks, given meshes.", rich_markup_mode=None
+)
 
 
 @app.command("import")
@@ -91,7 +95,7 @@ def boxes_from_masks(
 @app.command("refine")
 def refine_box(
     session: take.Session,
-    box_id: Annotated[int, typer.Argument(metavar="BOX", help="The box's id.")],
+    box_id: take.BoxId,
     file: Annotated[
         Path | None,
         typer.Argument(metavar="FILE", help="JSON as POST boxes/BOX/refine takes it; - for stdin; default: its masks."),
@@ -151,6 +155,66 @@ def refine_box(
         note(f"ars-web: {warning}")
 
 
+@app.command("mesh")
+def box_mesh(
+    session: take.Session,
+    box_id: take.BoxId,
+    file: take.MeshFile = None,
+    unit: take.MeshUnit = None,
+    axes: take.MeshAxes = None,
+    origin: take.MeshOrigin = "centre",
+    remove: take.Remove = False,
+    sessions: take.Sessions = take.SESSIONS,
+    as_json: take.Json = False,
+) -> None:
+    """Give the object in a box a mesh of its own, or take it away: one step that one undo takes back.
+
+    It counts before the mesh of its class: `ars-web classes mesh`.
+    """
+    mesh, notes = take.read_mesh(file, unit=unit, axes=axes, origin=origin, remove=remove)
+    _give_mesh(sessions, session, box_id, lambda _: mesh, as_json=as_json)
+    for line in notes:
+        note(f"ars-web: {line}")
+
+
+@app.command("polygon")
+def box_polygon(
+    session: take.Session,
+    box_id: take.BoxId,
+    file: Annotated[
+        Path | None,
+        typer.Argument(metavar="FILE", help="JSON as PUT boxes/BOX/polygon takes it; - for stdin; none with --remove."),
+    ] = None,
+    remove: take.Remove = False,
+    sessions: take.Sessions = take.SESSIONS,
+    as_json: take.Json = False,
+) -> None:
+    """Have the object in a box be a planar polygon, or nothing of its own: one step that one undo takes back."""
+    from ars_web.sessions.mesh_reading import object_from_polygon
+    from ars_web.sessions.polygon_json import read_polygon_file
+
+    if remove == (file is not None):
+        raise BadInput("a polygon needs its file; --remove takes it away, and needs none")
+    if file is None:
+        _give_mesh(sessions, session, box_id, lambda _: None, as_json=as_json)
+        return
+    is_file = str(file) != "-"
+    try:
+        data = file.read_bytes() if is_file else sys.stdin.buffer.read()
+    except OSError as error:
+        raise BadFile(file, f"cannot be read: {error.strerror}") from error
+    source = file if is_file else "standard input"
+    wish = read_polygon_file(source, data)
+
+    def made(box: "VirtualBox") -> "SourcedMesh":
+        try:
+            return object_from_polygon(wish.corners, box.box, in_world=wish.frame_of == "world")
+        except BadInput as error:
+            raise BadFile(source, str(error)) from error
+
+    _give_mesh(sessions, session, box_id, made, as_json=as_json)
+
+
 @app.command("export")
 def export_boxes(
     session: take.Session,
@@ -173,6 +237,38 @@ def export_boxes(
         raise BadInput(f"{file} cannot be written: there is no folder {file.parent}; make it first")
     write_json(file, boxes)
     note(f"{len(boxes)} boxes in {file}")
+
+
+def _give_mesh(
+    sessions: Path,
+    session: str,
+    box_id: int,
+    mesh_for: "Callable[[VirtualBox], SourcedMesh | None]",
+    *,
+    as_json: bool,
+) -> None:
+    from ars_web.sessions.boxes_json import box_json
+    from ars_web.sessions.drafting import existing_box
+    from ars_web.sessions.editing import SessionEditor
+    from ars_web.sessions.store import SessionStore
+
+    with SessionStore(sessions) as store:
+        sid = store.find(session)
+        before = existing_box(store.state(sid), box_id)
+        mesh = mesh_for(before)
+        after = SessionEditor(store).change_box(
+            sid, box_id, expected_revision=before.revision, mesh=mesh, author=AUTHOR
+        )
+    if as_json:
+        print_json(box_json(after))
+    else:
+        print(f"{after.name}: {'no mesh of its own' if mesh is None else mesh_text(mesh)}")
+
+
+def mesh_text(sourced: "SourcedMesh") -> str:
+    """A mesh in a few words."""
+    extent = " x ".join(f"{1000 * side:.1f}" for side in sourced.mesh.extent)
+    return f"{sourced.source.name}, {len(sourced.mesh.faces)} faces, {extent} mm"
 
 
 def _millimetres(box: "VirtualBox") -> str:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ars_web import arguments as take
-from ars_web import box_commands, kernel_cache
+from ars_web import box_commands, class_commands, kernel_cache, label_commands
 from ars_web.errors import ArsError
 from ars_web.terminal import has_screen, note, open_browser, print_json, print_table, progress
 
@@ -41,6 +41,8 @@ app = typer.Typer(
     context_settings={"max_content_width": 120},
 )
 app.add_typer(box_commands.app, name="boxes")
+app.add_typer(class_commands.app, name="classes")
+app.add_typer(label_commands.app, name="labels")
 
 
 @app.callback(invoke_without_command=True)
@@ -204,9 +206,11 @@ def export(
     frames_list: take.FramesList = None,
     images: take.Images = None,
     shape: take.Shape = None,
+    masks: take.Masks = None,
     min_visible: take.MinVisible = None,
     max_truncated: take.MaxTruncated = None,
     min_area_px: take.MinArea = None,
+    heading_bins: take.HeadingBins = None,
     split_train: take.SplitTrain = None,
     split_val: take.SplitVal = None,
     split_test: take.SplitTest = None,
@@ -218,12 +222,14 @@ def export(
     tls_cert: take.TlsCert = None,
     tls_key: take.TlsKey = None,
     workers: take.Workers = None,
+    check: take.Check = False,
     sessions: take.Sessions = take.SESSIONS,
     as_json: take.Json = False,
 ) -> None:
     """Write a training set. Ctrl-C stops it; the same command then goes on from there."""
     from ars_web.datasets.cluster import cluster_at
     from ars_web.datasets.jobs import plan_export, run_export
+    from ars_web.datasets.readback.comparison import compare
     from ars_web.datasets.registry import WRITERS
     from ars_web.datasets.store_export import plan_stored_export, run_stored_export
     from ars_web.recordings.stores import place
@@ -232,6 +238,10 @@ def export(
     if kind not in WRITERS:
         raise typer.BadParameter(f"{kind!r} is none of {', '.join(WRITERS)}", param_hint="--format")
     target = place(out)
+    if check and not isinstance(target, Path):
+        raise typer.BadParameter(
+            f"a set on a store is not read back; export it to a folder, not to {target}", param_hint="--check"
+        )
     cluster = cluster_at(executor, ca_file=tls_ca_file, cert=tls_cert, key=tls_key)
     with SessionStore(sessions) as store:
         ids = [store.find(name) for name in (session, *take.comma_separated(merge, "--merge"))]
@@ -242,9 +252,11 @@ def export(
             "frames.list": take.whole_numbers(frames_list, "--frames-list") or None,
             "images": images,
             "shape": shape,
+            "masks": masks,
             "min_visible": min_visible,
             "max_truncated": max_truncated,
             "min_area_px": min_area_px,
+            "heading_bins": heading_bins,
             "split.train": split_train,
             "split.val": split_val,
             "split.test": split_test,
@@ -267,14 +279,21 @@ def export(
     except KeyboardInterrupt:
         note("ars-web: stopped; the same command goes on from here")
         raise typer.Exit(INTERRUPTED) from None
+    checked = compare(plan, plan.out) if check else None
     if as_json:
-        print_json({"out": str(target), "report": report.model_dump(mode="json")})
-        return
-    rows = [(name, s.images, s.negatives, s.labels) for name, s in report.splits.items()]
-    print_table(("split", "images", "without a label", "labels"), rows)
-    dropped = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in report.dropped.items() if count)
-    print(f"dropped: {dropped or 'none'}")
-    print(target)
+        print_json({"out": str(target), "report": report.model_dump(mode="json"), "check": checked})
+    else:
+        rows = [(name, s.images, s.negatives, s.labels) for name, s in report.splits.items()]
+        print_table(("split", "images", "without a label", "labels"), rows)
+        dropped = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in report.dropped.items() if count)
+        print(f"dropped: {dropped or 'none'}")
+        for loss in report.losses:
+            print(f"lost: {loss}")
+        if checked is not None:
+            print(*checked.lines(), sep="\n")
+        print(target)
+    if checked is not None and not checked.agrees:
+        raise typer.Exit(1)
 
 
 @app.command()
@@ -282,6 +301,9 @@ def preview(
     session: take.Session,
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the pictures.")],
     frames: Annotated[int, typer.Option("--frames", metavar="N", min=1, help="How many.")] = 6,
+    kind: Annotated[
+        str | None, typer.Option("--format", metavar="FORMAT", help="Draw what this format holds of each label.")
+    ] = None,
     sessions: take.Sessions = take.SESSIONS,
     as_json: take.Json = False,
 ) -> None:
@@ -291,7 +313,7 @@ def preview(
 
     with SessionStore(sessions) as store:
         snapshot = store.snapshot(store.find(session))
-    pictures = draw(snapshot, out, count=frames)
+    pictures = draw(snapshot, out, count=frames, format=kind)
     if as_json:
         print_json(pictures)
     else:
@@ -334,12 +356,14 @@ def unpack(
 
 @app.command()
 def formats(as_json: take.Json = False) -> None:
-    """The formats that recordings come in and datasets go out."""
+    """The formats that recordings and labels come in and datasets go out."""
+    from ars_web.annotations.registry import READERS as LABEL_READERS
     from ars_web.datasets.registry import WRITERS
     from ars_web.recordings.registry import READERS
 
     rows = [
         *(("import", reader.format, f"{reader.title}: {reader.needs}") for reader in READERS.values()),
+        *(("labels", reader.format, f"{reader.title}: {reader.needs}") for reader in LABEL_READERS.values()),
         *(("export", writer.format, writer.title) for writer in WRITERS.values()),
     ]
     if as_json:

@@ -25,10 +25,12 @@ import numpy as np
 import scene
 
 from ars_web.datasets.jobs import plan_export, run_export
+from ars_web.datasets.label_functions import Marks
 from ars_web.datasets.options import ExportOptions
 from ars_web.datasets.samples import LabelTable, Outlines, labels_in_frames, outlines_in_frames
 from ars_web.datasets.writers import coco
 from ars_web.geometry.camera import Camera
+from ars_web.geometry.rings import one_ring_each
 from ars_web.sessions.model import FrameTable, ObjectClass, SessionSnapshot, SessionState, VirtualBox
 
 SMALL = 400
@@ -147,7 +149,11 @@ def with_supervision(folder: Path, paths: list[Path], bbox: np.ndarray, kind: st
 
 
 def write_coco(folder: Path, table: LabelTable, keep: np.ndarray, outlines: Outlines, classes: np.ndarray) -> None:
-    content = coco.annotations(table, keep, outlines, classes, first=0, most_boxes=keep.shape[1])
+    # Without keypoints, which the peers are not handed either.
+    nothing = one_ring_each(np.zeros((0, 2)), np.zeros(keep.size + 1, dtype=np.int64))
+    marks = Marks(nothing, np.zeros((*keep.shape, 0, 2)), np.zeros((*keep.shape, 0), dtype=np.int64))
+    none = np.zeros(keep.shape[1], dtype=np.int64)
+    content = coco.annotations(table, keep, outlines, classes, marks, none, first=0, most_boxes=keep.shape[1])
     with (folder / "annotations.json").open("wb") as file:
         file.write(content.data)
         file.flush()

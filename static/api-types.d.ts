@@ -435,6 +435,46 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/sessions/{sid}/frames/{index}/marks": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Marks
+         * @description Every box of the session as a label function draws it in a frame, as exports that use it write it.
+         */
+        get: operations["frame-marks-list"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/exports/picture": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Picture
+         * @description One frame with the labels that an export would write, drawn as the format holds them.
+         */
+        get: operations["exports-picture"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/sessions/{sid}/labels": {
         parameters: {
             query?: never;
@@ -1784,7 +1824,7 @@ export interface components {
             options: components["schemas"]["ExportOptions"];
             /**
              * Shape
-             * @description what the labels are drawn round: box, hull, or `hull or box` where some have no hull
+             * @description what the labels are drawn round: box, hull, mesh, or such as `hull or box` where some have no hull
              */
             shape: string;
             /** Sessions */
@@ -1802,6 +1842,11 @@ export interface components {
             dropped: {
                 [key: string]: number;
             };
+            /**
+             * Losses
+             * @description what of the session the format cannot hold, one line each
+             */
+            losses: string[];
             /** Rectified Cameras */
             rectified_cameras: components["schemas"]["RectifiedCamera"][];
             /** Label Files */
@@ -1889,6 +1934,11 @@ export interface components {
             dropped: {
                 [key: string]: number;
             };
+            /**
+             * Losses
+             * @description what of the session the format cannot hold, one line each
+             */
+            losses: string[];
             images: components["schemas"]["ImageCounts"];
             /**
              * Image Bytes
@@ -1910,6 +1960,8 @@ export interface components {
             readers: components["schemas"]["ReaderJson"][];
             /** Writers */
             writers: components["schemas"]["WriterJson"][];
+            /** Label Functions */
+            label_functions: components["schemas"]["LabelFunctionJson"][];
         };
         /**
          * FrameChoice
@@ -2276,6 +2328,18 @@ export interface components {
             created: string;
         };
         /**
+         * LabelFunctionJson
+         * @description One of the ways to mark an object in an image.
+         */
+        LabelFunctionJson: {
+            /** Name */
+            name: string;
+            /** Title */
+            title: string;
+            /** Description */
+            description: string;
+        };
+        /**
          * LabelJson
          * @description One box in one frame; image coordinates of the original image, (0, 0) its top left corner.
          */
@@ -2597,6 +2661,48 @@ export interface components {
              * @enum {string}
              */
             position: "box" | "mass";
+        };
+        /**
+         * MarkJson
+         * @description What a label function draws of one object in one frame; image coordinates, to a hundredth of a pixel.
+         */
+        MarkJson: {
+            /** Box Id */
+            box_id: number;
+            /** Class Id */
+            class_id: number;
+            /**
+             * Rings
+             * @description not closed; empty: no part is in the image
+             */
+            rings: [
+                number,
+                number
+            ][][];
+            /** Points */
+            points: components["schemas"]["MarkedPointJson"][];
+        };
+        /**
+         * MarkedPointJson
+         * @description A named point of an object.
+         */
+        MarkedPointJson: {
+            /** Name */
+            name: string;
+            /**
+             * At
+             * @description null: behind the camera, or beyond what the lens can show
+             */
+            at: [
+                number,
+                number
+            ] | null;
+            /**
+             * State
+             * @description unseen: not in the image
+             * @enum {string}
+             */
+            state: "unseen" | "hidden" | "seen";
         };
         /**
          * MaskAnswer
@@ -3643,6 +3749,11 @@ export interface components {
             title: string;
             /** Description */
             description: string;
+            /**
+             * Shows
+             * @description the label functions that what it holds of a label is drawn by
+             */
+            shows: string[];
             /**
              * Shapes
              * @description what its labels can be drawn round
@@ -6527,6 +6638,198 @@ export interface operations {
             };
             /** @description a thing named in the path is not there */
             404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "frame-marks-list": {
+        parameters: {
+            query: {
+                function: "box" | "convex" | "silhouette" | "rectangle" | "keypoints";
+                /** @description default: the hull where a box has one, else the box */
+                shape?: ("box" | "hull" | "mesh") | null;
+            };
+            header?: never;
+            path: {
+                sid: string;
+                index: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MarkJson"][];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "exports-picture": {
+        parameters: {
+            query: {
+                format: "yolo" | "coco" | "voc" | "ars";
+                /** @description default: one with many labels */
+                frame?: number | null;
+                /** @description default: the hull where a box has one, else the box */
+                shape?: ("box" | "hull" | "mesh") | null;
+                min_visible?: number;
+                max_truncated?: number;
+            };
+            header?: never;
+            path: {
+                sid: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description a JPEG of one labelled frame */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "image/jpeg": unknown;
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description beyond a limit, which the detail names */
+            413: {
                 headers: {
                     [name: string]: unknown;
                 };

@@ -44,6 +44,22 @@ install_import_hook(
             "visual_hull",
             "hull_box",
             "mesh_silhouette",
+            "resting_objects",
+            "symmetry_of_turns",
+            "projected_points",
+            "convex_outlines",
+            "rings",
+            "minimum_rectangles",
+            "mesh_outlines",
+            "mesh_labels",
+            "two_sided",
+            "flat_mesh",
+            "box_mesh",
+            "shape_stack",
+            "shape_occlusion",
+            "instance_masks",
+            "run_lengths",
+            "hidden_points",
         )
     ],
     "beartype.beartype",
@@ -104,6 +120,12 @@ def _beside(name: str) -> ModuleType:
 def ring_scene() -> ModuleType:
     """`ring_scene.py`: a recording round an object, with the object's outlines."""
     return _beside("ring_scene")
+
+
+@pytest.fixture(scope="session")
+def bop_scene() -> ModuleType:
+    """`bop_scene.py`: the ring of cameras as a BOP dataset, with objects."""
+    return _beside("bop_scene")
 
 
 @pytest.fixture(scope="session")

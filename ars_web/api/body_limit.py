@@ -1,12 +1,16 @@
 """No request makes the server hold more than it agreed to."""
 
+import re
+
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from ars_web.api.problems import ProblemResponse
 
-UPLOAD_PATHS = frozenset({"/api/sessions/upload", "/api/imports/uploads"})
-"""Read piece by piece by their handlers, which count for themselves."""
+UPLOADS = re.compile(
+    r"/api/(?:sessions/upload|imports/uploads|sessions/[^/]+/(?:labels/upload|(?:classes|boxes)/[^/]+/mesh))"
+)
+"""Paths that are read piece by piece by their handlers, which count for themselves."""
 
 
 class BodyLimit:
@@ -18,7 +22,7 @@ class BodyLimit:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass on with the body in hand, or answer 413."""
-        if scope["type"] != "http" or scope["path"] in UPLOAD_PATHS:
+        if scope["type"] != "http" or UPLOADS.fullmatch(scope["path"]):
             await self.app(scope, receive, send)
             return
         declared = Headers(scope=scope).get("content-length", "0")

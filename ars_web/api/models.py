@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
+from ars_web.api.mesh_models import KeypointAnswer, Keypoints, MeshJson, SymmetryAnswer, SymmetryJson
 from ars_web.datasets.exports import ExportJob
 from ars_web.datasets.options import ExportOptions
 from ars_web.datasets.registry import WRITERS
@@ -26,6 +27,7 @@ from ars_web.sessions.history import History
 from ars_web.sessions.mask_json import mask_json, mask_json_without_outline
 from ars_web.sessions.model import FrameTable, Mask, ObjectClass, SessionSummary, VirtualBox
 from ars_web.sessions.names import LONGEST_NAME
+from ars_web.sessions.object_mesh import SourcedMesh
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Point = Annotated[list[Number], Field(min_length=3, max_length=3)]
@@ -130,6 +132,8 @@ class ClassPatch(Strict):
     name: Name | None = None
     color: Color | None = None
     default_size: Size | None = Field(None, description="null: not set any more")
+    symmetry: SymmetryJson | None = Field(None, description="of its objects; null: none any more")
+    keypoints: Keypoints | None = Field(None, description="null or none: the box's centre and corners")
 
 
 class TransformAnswer(BaseModel):
@@ -148,12 +152,15 @@ class ClassAnswer(BaseModel):
     default_size: tuple[float, float, float] | None = Field(
         description="metres, of new boxes of this class; null: not set"
     )
+    symmetry: SymmetryAnswer = Field(description="of its objects, in their boxes' frames")
+    keypoints: list[KeypointAnswer] = Field(description="of its objects; none: the box's centre and corners")
+    mesh: MeshJson | None = Field(description="of its objects; null: none. Edits have its `digest` alone")
     revision: int = Field(description="the session's revision that last changed it")
 
     @classmethod
-    def of(cls, a_class: ObjectClass) -> "ClassAnswer":
-        """The JSON of a class."""
-        return cls.model_validate(class_json(a_class))
+    def of(cls, a_class: ObjectClass, meshes: Mapping[str, SourcedMesh]) -> "ClassAnswer":
+        """The JSON of a class, whose mesh is one of `meshes`, by digest."""
+        return cls.model_validate(class_json(a_class, meshes))
 
 
 class BoxAnswer(BaseModel):
@@ -166,6 +173,7 @@ class BoxAnswer(BaseModel):
     size: tuple[float, float, float] = Field(description="metres along the box's own axes")
     has_hull: bool = Field(description="whether a visual hull is stored with it")
     hull_options: HullOptionsJson | None = Field(description="how it was made from its masks; null: it was not")
+    has_mesh: bool = Field(description="whether a mesh of its own is stored with it; it counts before its class's")
     locked: bool = Field(description="class, place and size stay, and it is not deleted, until it is unlocked")
     revision: int = Field(description="the session's revision that last changed it")
 
@@ -395,7 +403,7 @@ def current_json(current: object) -> Mapping[str, Any] | None:
     if isinstance(current, VirtualBox):
         return box_json(current)
     if isinstance(current, ObjectClass):
-        return class_json(current)
+        return class_json(current, {})
     if isinstance(current, Mask):
         return mask_json(current)
     if isinstance(current, SessionSummary):

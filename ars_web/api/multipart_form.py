@@ -41,9 +41,15 @@ class MultipartForm:
         self._target: IO[bytes] | None = None
 
     async def receive(
-        self, content_type: str, pieces: AsyncIterable[bytes], *, declared: str | None, most: int
+        self,
+        content_type: str,
+        pieces: AsyncIterable[bytes],
+        *,
+        declared: str | None,
+        most: int,
+        remedy: str = "import the recording from a declared root instead",
     ) -> None:
-        """Take the form in; `declared` is its Content-Length.
+        """Take the form in; `declared` is its Content-Length, and `remedy` what to do with one over `most` bytes.
 
         Raises:
             TooLarge: it is over `most` bytes, whatever its headers say.
@@ -54,7 +60,7 @@ class MultipartForm:
         boundary = options.get(b"boundary")
         if kind != b"multipart/form-data" or not boundary:
             raise BadInput(f"a multipart/form-data request is needed, with {', '.join(('`file`', *self._known))}")
-        too_large = TooLarge(f"the upload is over {most} bytes; import the recording from a declared root instead")
+        too_large = TooLarge(f"the upload is over {most} bytes; {remedy}")
         if declared is not None and declared.isdigit() and int(declared) > most:
             raise too_large
         received = 0

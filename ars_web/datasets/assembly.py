@@ -4,7 +4,7 @@ import os
 import shutil
 from pathlib import Path
 
-from ars_web.datasets.plan import ExportPlan
+from ars_web.datasets.planned import ExportPlan
 from ars_web.datasets.registry import writer_of
 from ars_web.datasets.report import ExportReport, ShardReport, report_of, used_splits
 from ars_web.datasets.worker import shard_folder
@@ -43,7 +43,11 @@ def assemble(plan: ExportPlan, partial: Path) -> ExportReport:
 def description_of(plan: ExportPlan) -> Dataset:
     """What a writer needs to join the plan's shards."""
     return Dataset(
-        splits=used_splits(plan), class_names=plan.class_names, description="Labels of virtual boxes, by ARS Web"
+        splits=used_splits(plan),
+        classes=plan.classes,
+        sessions=plan.sessions,
+        options=plan.options,
+        description="Labels of virtual boxes, by ARS Web",
     )
 
 

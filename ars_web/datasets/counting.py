@@ -4,12 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Int
 
-from ars_web.datasets.plan import ExportPlan
+from ars_web.datasets.planned import ExportPlan
 from ars_web.datasets.report import SplitCounts
-from ars_web.datasets.samples import LabelTable, kept, labels_in_frames
-from ars_web.geometry.camera import Camera, rectified
+from ars_web.datasets.samples import LabelTable, kept, labels_of_shapes
+from ars_web.datasets.shapes import PosedShapes, stacked_keypoints
+from ars_web.geometry.camera import rectified
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,36 +18,37 @@ class Selection:
     """The labels of a run of n frames of one session with b boxes.
 
     Attributes:
-        cameras: of the images as they are written.
+        shapes: with the cameras of the images as they are written.
         table: of all boxes.
         keep: (n, b) which of them are written.
         dropped: how many are not, by reason.
     """
 
-    cameras: dict[int, Camera]
+    shapes: PosedShapes
     table: LabelTable
     keep: Bool[np.ndarray, "n b"]
     dropped: dict[str, int]
 
 
-def select_labels(plan: ExportPlan, start: int, stop: int, *, with_visible: bool = False) -> Selection:
-    """The labels of the plan's frames from `start` up to `stop`, all of one session.
+def select_labels(plan: ExportPlan, rows: slice | Int[np.ndarray, "n"], *, with_visible: bool = False) -> Selection:
+    """The labels of some of the plan's frames, all of one session.
 
     Visible shares are found where the options drop labels by them, or `with_visible` asks for them.
     """
     frames = plan.frames
-    session = plan.sessions[int(frames.session[start])]
+    session = plan.sessions[int(frames.session[rows][0])]
     rectify = plan.options.images == "rectify"
-    cameras = {i: rectified(c) if rectify else c for i, c in session.cameras.items()}
-    table = labels_in_frames(
-        cameras,
-        frames.camera_id[start:stop],
-        frames.Ts_world_camera[start:stop],
-        session.boxes,
-        hulls=session.hulls,
-        with_visible=with_visible or plan.options.min_visible > 0,
+    keypoints = [plan.classes[place].keypoints for place in session.class_of_box]
+    shapes = PosedShapes(
+        cameras={i: rectified(c) if rectify else c for i, c in session.cameras.items()},
+        camera_ids=frames.camera_id[rows],
+        Ts_world_camera=frames.Ts_world_camera[rows],
+        boxes=session.boxes,
+        meshes=session.meshes,
+        keypoints_world=stacked_keypoints(session.boxes, keypoints),
     )
-    return Selection(cameras, table, *kept(table, plan.options))
+    table = labels_of_shapes(shapes, with_visible=with_visible or plan.options.min_visible > 0)
+    return Selection(shapes, table, *kept(table, plan.options))
 
 
 def split_counts(

@@ -67,6 +67,21 @@ class Canvas:
         cv2.fillPoly(layer, [self._fixed(ring)], color, cv2.LINE_AA, _SHIFT)
         self._blend(layer, opacity)
 
+    def fill_rings(self, rings: Sequence[Float[np.ndarray, "k 2"]], color: Color, *, opacity: float) -> None:
+        """Tint the area within rings, holes left out (the even-odd rule)."""
+        if not rings:
+            return
+        layer = self.pixels.copy()
+        cv2.fillPoly(layer, [self._fixed(ring) for ring in rings], color, cv2.LINE_AA, _SHIFT)
+        self._blend(layer, opacity)
+
+    def dot(self, point: Float[np.ndarray, "2"], color: Color, *, hollow: bool) -> None:
+        """Mark a point, with a ring where it is hollow."""
+        x, y = self._fixed(point[None])[0].tolist()
+        for radius, ink in ((5.0, _HALO), (4.0, color)) if not hollow else ((5.0, _HALO), (4.0, color), (2.2, _HALO)):
+            size = round(radius * self._unit * (1 << _SHIFT))
+            cv2.circle(self.pixels, (x, y), size, ink, -1, cv2.LINE_AA, _SHIFT)
+
     def lines(self, polylines: Sequence[Float[np.ndarray, "k 2"]], color: Color, *, width: float) -> None:
         """Draw polylines over their common halo."""
         fixed = [self._fixed(line) for line in polylines]
@@ -87,18 +102,20 @@ class Canvas:
     def tag(self, bbox: tuple[float, float, float, float], name: str, note: str, color: Color) -> None:
         """Write a name and a note on the colour, at a corner of the bounding box where nothing is written yet."""
         size, pad = 0.52 * self._unit, round(6 * self._unit)
-        texts = (plain(name), note)
+        texts = [plain(name), *([note] if note else [])]
         widths = [cv2.getTextSize(text, _FONT, size, 1)[0][0] for text in texts]
         line = cv2.getTextSize("Ag", _FONT, size, 1)[0][1]
-        width, height = sum(widths) + 3 * pad, line + 2 * pad
+        width, height = sum(widths) + (1 + len(texts)) * pad, line + 2 * pad
         x, y = self._free_place(bbox, width, height)
         self._taken.append((x, y, x + width, y + height))
         cv2.rectangle(self.pixels, (x - 1, y - 1), (x + width, y + height), _HALO, -1)
         cv2.rectangle(self.pixels, (x, y), (x + width - 1, y + height - 1), color, -1)
         ink = readable_on(color)
         baseline = y + pad + line
-        self._write(texts[0], (x + pad, baseline), size, ink)
-        self._write(texts[1], (x + 2 * pad + widths[0], baseline), size, ink)
+        left = x + pad
+        for text, wide in zip(texts, widths, strict=True):
+            self._write(text, (left, baseline), size, ink)
+            left += wide + pad
 
     def caption(self, left: str, right: str) -> None:
         """Write on a strip added below the image, where it hides nothing. Drawn last."""

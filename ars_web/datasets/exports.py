@@ -25,10 +25,11 @@ from ars_web.datasets.cluster import Cluster
 from ars_web.datasets.forecast import Forecast, forecast
 from ars_web.datasets.jobs import partial_folder, run_export
 from ars_web.datasets.options import ExportOptions
-from ars_web.datasets.plan import ExportPlan, check_merged, plan_export
+from ars_web.datasets.plan import check_merged, plan_export
 from ars_web.datasets.plan_files import read_digest, read_plan
+from ars_web.datasets.planned import ExportPlan
 from ars_web.datasets.registry import writer_of
-from ars_web.datasets.samples import check_shape
+from ars_web.datasets.shapes import check_shape
 from ars_web.errors import ArsError, BadInput, Cancelled, Conflict, NotFound, StoreError
 from ars_web.recordings.recording import StoredImage
 from ars_web.sessions.model import SessionSnapshot
@@ -134,12 +135,12 @@ class ExportJobs:
             StoreError: the job cannot be kept.
         """
         writer_of(format)
-        check_shape(options.shape)
         with self._lock:
             before = self._made_with(key, sid, format, options)
         if before is not None:
             return before
         snapshots = self._snapshots(sid, options)
+        check_shape(options.shape, snapshots)
         job = ExportJob(
             id=f"x{secrets.token_hex(6)}",
             session_id=sid,

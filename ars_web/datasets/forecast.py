@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from ars_web.datasets.counting import select_labels, split_counts
 from ars_web.datasets.images import image_name, placement
 from ars_web.datasets.options import ExportOptions
-from ars_web.datasets.plan import ExportPlan
+from ars_web.datasets.planned import ExportPlan
 from ars_web.datasets.registry import writer_of
 from ars_web.datasets.report import ClassUsed, SessionUsed, ShardReport, SplitCounts, report_of
 from ars_web.datasets.splits import SPLITS
@@ -44,6 +44,7 @@ class Forecast(_Record):
     classes: list[ClassUsed]
     splits: dict[str, SplitCounts]
     dropped: dict[str, int] = Field(description="boxes of frames without a label, by the first rule that applied")
+    losses: list[str] = Field(description="what of the session the format cannot hold, one line each")
     images: ImageCounts
     image_bytes: int = Field(description="of all images, linked ones too: about what a download holds")
     new_bytes: int = Field(description="of the images that are not linked: about what the dataset takes on the disk")
@@ -65,6 +66,7 @@ def forecast(plan: ExportPlan, *, cancelled: Callable[[], bool] | None = None) -
         classes=report.classes,
         splits=report.splits,
         dropped=report.dropped,
+        losses=report.losses,
         images=images,
         image_bytes=image_bytes,
         new_bytes=new_bytes,
@@ -79,7 +81,7 @@ def _counted(plan: ExportPlan, cancelled: Callable[[], bool]) -> Iterator[ShardR
             if cancelled():
                 raise Cancelled("nobody waits for what the export would write any more")
             last = min(first + step, stop)
-            selection = select_labels(plan, first, last)
+            selection = select_labels(plan, slice(first, last))
             splits = [SPLITS[i] for i in plan.frames.split[first:last].tolist()]
             counts = split_counts(splits, selection.keep, session.class_of_box, plan.class_names)
             yield ShardReport(splits=counts, dropped=selection.dropped, digests={})
@@ -91,12 +93,12 @@ def _images(plan: ExportPlan) -> tuple[ImageCounts, int, int]:
     counts, size, new = {"linked": 0, "copied": 0, "encoded": 0}, 0, 0
     frames, options = plan.frames, plan.options
     if options.images != "none":
-        only_jpeg = writer_of(plan.format).only_jpeg
+        writer = writer_of(plan.format)
         device = cache(_device)
         here = device(str(plan.out.parent))
         columns = (frames.session.tolist(), frames.camera_id.tolist(), frames.stamps[:, 0].tolist())
         for source, stem, session, camera_id, bytes_ in zip(frames.sources, frames.stems, *columns, strict=True):
-            target = image_name(stem, source, only_jpeg=only_jpeg)
+            target = image_name(stem, source, only_jpeg=writer.only_jpeg, only_png=writer.only_png)
             how = placement(source, target, camera=plan.sessions[session].cameras[camera_id], images=options.images)
             if how == "linked" and (is_address(source) or device(source.rpartition("/")[0]) != here):
                 how = "copied"

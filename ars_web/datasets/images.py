@@ -37,9 +37,11 @@ _NO_LINK = frozenset({errno.EXDEV, errno.EPERM, errno.EACCES, errno.EMLINK, errn
 """Another file system, a protected file, too many links, a file system without links: a copy is made instead."""
 
 
-def image_name(stem: str, source: str, *, only_jpeg: bool) -> str:
+def image_name(stem: str, source: str, *, only_jpeg: bool, only_png: bool = False) -> str:
     """The file name of an image in the dataset: JPEG and PNG keep their extension, in lower case."""
     suffix = _suffix(source)
+    if only_png:
+        return stem + ".png"
     if suffix in _JPEG_SUFFIXES:
         return stem + (".jpg" if only_jpeg else suffix)
     return stem + (".jpg" if only_jpeg else ".png")

@@ -17,8 +17,9 @@ from pathlib import Path
 
 from ars_web.datasets import cluster as clusters
 from ars_web.datasets.assembly import assemble, finished_shards, is_published, publish
-from ars_web.datasets.plan import ExportPlan, plan_export, usable_out
+from ars_web.datasets.plan import plan_export, usable_out
 from ars_web.datasets.plan_files import digest_of, read_digest, write_plan
+from ars_web.datasets.planned import ExportPlan
 from ars_web.datasets.report import ExportReport
 from ars_web.datasets.shard_runs import Workplace, run_shards
 from ars_web.datasets.worker import CANCEL, begun_folders, export_shard, start_worker

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Any, Literal, cast
 
 from ars_web.datasets.options import ExportOptions
-from ars_web.datasets.samples import SHAPES
 
 OptionType = Literal["integer", "number", "choice", "integers", "texts"]
 
@@ -72,14 +71,13 @@ def _option(name: str, field: dict[str, Any], default: Any) -> ExportOption:
     kinds = [kind for kind in field.get("anyOf", [field]) if kind.get("type") != "null"]
     (kind,) = kinds
     meanings: dict[str, str] = field.get("x-meanings", {})
-    possible = [value for value in kind.get("enum", ()) if name != "shape" or value in SHAPES]
     return ExportOption(
         name=name,
         title=field["title"],
         meaning=field["description"],
         type=_TYPES[kind["type"], kind.get("items", {}).get("type", "")],
         optional="anyOf" in field and "x-null-means" not in field,
-        choices=tuple(OptionChoice(value, meanings[value]) for value in possible),
+        choices=tuple(OptionChoice(value, meanings[value]) for value in kind.get("enum", ())),
         default=field.get("x-null-means") if default is None else default,
         minimum=kind.get("minimum"),
         maximum=kind.get("maximum"),

@@ -102,10 +102,19 @@ class ExportOptions(_Strict):
             **_meanings(
                 box="the virtual box, also of objects that have a hull",
                 hull="the visual hull of the object's masks, where there is one; else the box",
-                mesh="the class's mesh",
+                mesh="the mesh of the object or its class, where there is one; else the hull, else the box",
             ),
             "x-null-means": "hull",
         },
+    )
+    masks: Literal["write", "none"] = Field(
+        "write",
+        title="Masks",
+        description="of formats that hold each label's pixels as images, which BOP scenes do",
+        json_schema_extra=_meanings(
+            write="two PNG files a label: its whole silhouette, and what is seen of it",
+            none="no masks, which is much faster; counts of pixels are estimates from outlines",
+        ),
     )
     min_visible: Share = Field(
         0.0,
@@ -124,6 +133,14 @@ class ExportOptions(_Strict):
         allow_inf_nan=False,
         title="Smallest area",
         description="labels whose box in the image is smaller than so many pixels are dropped",
+    )
+    heading_bins: int = Field(
+        18,
+        strict=True,
+        ge=0,
+        le=360,
+        title="Bins of a heading",
+        description="how many bins a turn has where headings are part of the class; 0 writes them as angles",
     )
     split: SplitChoice = SplitChoice()  # pyright: ignore[reportCallIssue]
     sessions: tuple[str, ...] = Field(

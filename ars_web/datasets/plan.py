@@ -6,27 +6,21 @@ the machine, so that an export that was interrupted can be recognised and resume
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Int
 
 from ars_web.datasets import splits
 from ars_web.datasets.file_names import stems
 from ars_web.datasets.image_stamps import stamps_now
 from ars_web.datasets.options import ExportOptions, FrameChoice
+from ars_web.datasets.planned import ExportPlan, PlannedClass, PlannedFrames, PlannedSession, seconds_per_frame
 from ars_web.datasets.registry import writer_of
-from ars_web.datasets.samples import check_shape, hulls_of
+from ars_web.datasets.shapes import check_shape, meshes_of, shape_kinds
 from ars_web.errors import BadInput
-from ars_web.geometry.box import Box
-from ars_web.geometry.camera import Camera
-from ars_web.geometry.mesh import Mesh
 from ars_web.sessions.model import SessionSnapshot
-
-SECONDS_PER_FRAME = {"none": 0.0003, "link": 0.0005, "copy": 0.001, "rectify": 0.02}
-"""Rough cost on one core, by where the images come from: what shards are cut by, never what is promised."""
 
 SHARD_SECONDS = 10.0
 SHARD_BOX_FRAMES = 100_000
@@ -34,79 +28,6 @@ SHARD_BOX_FRAMES = 100_000
 
 FEWEST_SHARDS = 8
 """Of an export that takes long enough for a pool: then two or four workers end at about the same time."""
-
-
-@dataclass(frozen=True, eq=False)
-class PlannedSession:
-    """What the work needs of one session.
-
-    Attributes:
-        hulls: in the world, what the labels of each box are drawn round; None: the box.
-        class_of_box: places in the plan's class names.
-    """
-
-    id: str
-    name: str
-    revision: int
-    cameras: dict[int, Camera]
-    boxes: tuple[Box, ...]
-    hulls: tuple[Mesh | None, ...]
-    class_of_box: tuple[int, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class PlannedFrames:
-    """The chosen frames, one column each, session after session and by index within.
-
-    Attributes:
-        session: (n,) places in the plan's sessions.
-        index: (n,) in the session.
-        camera_id: (n,) key into the session's cameras.
-        split: (n,) places in `splits.SPLITS`.
-        Ts_world_camera: (n, 4, 4).
-        stamps: (n, 2) size in bytes and time of change in ns of the source images, of those on a store a number that
-            changes with them; zeros where none are wanted.
-        names: in the session.
-        stems: of the dataset's files.
-        sources: the images, absolute, or their addresses on a store.
-    """
-
-    session: Int[np.ndarray, "n"]
-    index: Int[np.ndarray, "n"]
-    camera_id: Int[np.ndarray, "n"]
-    split: Int[np.ndarray, "n"]
-    Ts_world_camera: Float[np.ndarray, "n 4 4"]
-    stamps: Int[np.ndarray, "n 2"]
-    names: Sequence[str]
-    stems: Sequence[str]
-    sources: Sequence[str]
-
-    def __len__(self) -> int:
-        return len(self.names)
-
-
-@dataclass(frozen=True, eq=False)
-class ExportPlan:
-    """An export, decided.
-
-    Attributes:
-        out: the dataset's folder, absolute; not there yet, or empty.
-        class_names: of the dataset, a class's id being its place: those of the sessions, merged by name in order.
-        shards: ranges of frames, each within one session.
-    """
-
-    out: Path
-    format: str
-    options: ExportOptions
-    class_names: tuple[str, ...]
-    sessions: tuple[PlannedSession, ...]
-    frames: PlannedFrames
-    shards: tuple[tuple[int, int], ...]
-
-    @property
-    def seconds(self) -> float:
-        """Rough work in seconds on one core."""
-        return len(self.frames) * SECONDS_PER_FRAME[self.options.images]
 
 
 def plan_export(
@@ -124,13 +45,13 @@ def plan_export(
     `frames_per_shard` overrides the planner's choice of shards; the dataset's bytes do not depend on it.
 
     Raises:
-        BadInput: the format or the shape is unknown or cannot be made, `out` is in use, a frame or a session is
-            chosen that is not there, or no frame at all.
+        BadInput: the format or the shape is unknown or cannot be made, the format can hold nothing useful of the
+            sessions, `out` is in use, a frame or a session is chosen that is not there, or no frame at all.
         BadFile: a source image is missing, or has become a link.
     """
     writer = writer_of(format)
-    check_shape(options.shape)
     check_merged(snapshots)
+    check_shape(options.shape, snapshots)
     options = options.model_copy(update={"sessions": tuple(s.id for s in snapshots[1:])})
     out = usable_out(out)
     chosen = [_chosen(options.frames, snapshot) for snapshot in snapshots]
@@ -141,7 +62,8 @@ def plan_export(
             + ", ".join(f"{len(s.frames)} ({s.id})" for s in snapshots)
             + " frames; widen the choice of frames"
         )
-    class_names = tuple(dict.fromkeys(c.name for s in snapshots for _, c in sorted(s.state.classes.items())))
+    classes = merged_classes(snapshots)
+    class_names = [a_class.name for a_class in classes]
     sessions = tuple(_planned_session(snapshot, class_names, options.shape) for snapshot in snapshots)
     # All frames are named, not only the chosen ones, so that a frame is called the same in every export.
     prefixes = [f"{s.id}_" if len(snapshots) > 1 else "" for s in snapshots]
@@ -158,13 +80,17 @@ def plan_export(
         stamps=np.zeros((len(picked), 2), dtype=np.int64) if options.images == "none" else _stamps(sources),
         names=tuple(snapshots[number].frames.names[i] for number, i in picked),
         stems=tuple(
-            f"{place:05d}" if writer.numbered else named[number][i] for place, (number, i) in enumerate(picked)
+            f"{place:0{writer.digits}d}" if writer.numbered else named[number][i]
+            for place, (number, i) in enumerate(picked)
         ),
         sources=sources,
     )
     most_boxes = max(len(session.boxes) for session in sessions)
-    length = frames_per_shard or _frames_per_shard(len(frames), most_boxes, options.images)
-    return ExportPlan(out, format, options, class_names, sessions, frames, _shards(counts, length))
+    length = frames_per_shard or _frames_per_shard(len(frames), most_boxes, seconds_per_frame(format, options))
+    plan = ExportPlan(out, format, options, classes, sessions, frames, _shards(counts, length))
+    # A format that can hold nothing useful of it, or not be written here, says so now and not when all is done.
+    writer.losses(plan)
+    return plan
 
 
 def check_merged(snapshots: Sequence[SessionSnapshot]) -> None:
@@ -175,6 +101,24 @@ def check_merged(snapshots: Sequence[SessionSnapshot]) -> None:
     twice = sorted({i for i in ids if ids.count(i) > 1})
     if twice:
         raise BadInput(f"session {twice[0]} is merged twice; name each session once")
+
+
+def merged_classes(snapshots: Sequence[SessionSnapshot]) -> tuple[PlannedClass, ...]:
+    """The classes of the sessions, those of one name being one.
+
+    Raises:
+        BadInput: two sessions say different things of the keypoints or the symmetry of one class.
+    """
+    found: dict[str, PlannedClass] = {}
+    for snapshot in snapshots:
+        for _, a_class in sorted(snapshot.state.classes.items()):
+            planned = PlannedClass(a_class.name, snapshot.state.keypoints_of(a_class.id), a_class.symmetry)
+            if found.setdefault(a_class.name, planned) != planned:
+                raise BadInput(
+                    f"class {a_class.name!r} has other keypoints or another symmetry in session {snapshot.id} than in"
+                    " the sessions it is merged with; make them alike, or rename one"
+                )
+    return tuple(found.values())
 
 
 def usable_out(out: Path) -> Path:
@@ -209,17 +153,20 @@ def _chosen(choice: FrameChoice, snapshot: SessionSnapshot) -> Int[np.ndarray, "
     return np.array(sorted(set(choice.list)), dtype=np.int64)
 
 
-def _planned_session(snapshot: SessionSnapshot, class_names: tuple[str, ...], shape: str | None) -> PlannedSession:
+def _planned_session(snapshot: SessionSnapshot, class_names: Sequence[str], shape: str | None) -> PlannedSession:
     state = snapshot.state
     place = {class_id: class_names.index(c.name) for class_id, c in state.classes.items()}
-    boxes = [state.boxes[i] for i in sorted(state.boxes)]
+    boxes, meshes = [state.boxes[i] for i in sorted(state.boxes)], tuple(meshes_of(snapshot, shape=shape))
     return PlannedSession(
         id=snapshot.id,
         name=state.name,
         revision=state.revision,
         cameras=dict(sorted(snapshot.cameras.items())),
+        box_ids=tuple(b.id for b in boxes),
+        box_names=tuple(b.name for b in boxes),
         boxes=tuple(b.box for b in boxes),
-        hulls=tuple(hulls_of(snapshot, shape=shape)),
+        meshes=meshes,
+        drawn_round=tuple(shape_kinds(snapshot, shape=shape)),
         class_of_box=tuple(place[b.class_id] for b in boxes),
     )
 
@@ -232,8 +179,7 @@ def _stamps(sources: Sequence[str]) -> Int[np.ndarray, "n 2"]:
     return stamps
 
 
-def _frames_per_shard(frames: int, most_boxes: int, images: str) -> int:
-    cost = SECONDS_PER_FRAME[images]
+def _frames_per_shard(frames: int, most_boxes: int, cost: float) -> int:
     longest = min(SHARD_SECONDS / cost, SHARD_BOX_FRAMES / max(most_boxes, 1))
     if frames * cost > 2.0:
         longest = min(longest, frames / FEWEST_SHARDS)

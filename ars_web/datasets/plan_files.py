@@ -16,10 +16,12 @@ import numpy as np
 
 from ars_web.datasets import plan_columns
 from ars_web.datasets.options import ExportOptions
-from ars_web.datasets.plan import ExportPlan, PlannedFrames, PlannedSession
+from ars_web.datasets.planned import ExportPlan, PlannedClass, PlannedFrames, PlannedSession
 from ars_web.geometry.box import Box, stack
 from ars_web.geometry.camera import Camera
+from ars_web.geometry.keypoints import Keypoint
 from ars_web.geometry.mesh import Mesh
+from ars_web.geometry.symmetry import Symmetry
 
 _VERSION = 3
 """Of these files and of what a shard's folder holds; another version's partial folder is not resumed."""
@@ -62,7 +64,7 @@ def read_plan(folder: Path, *, out: Path) -> ExportPlan:
             tuple(Box(T, size) for T, size in zip(arrays[f"Ts_world_box_{i}"], arrays[f"sizes_{i}"], strict=True))
             for i in range(len(document["sessions"]))
         ]
-        hulls = [_hulls(arrays, i, len(boxes[i])) for i in range(len(boxes))]
+        meshes = [_meshes(arrays, i, len(boxes[i])) for i in range(len(boxes))]
     numbers, texts = plan_columns.read_columns(folder)
     sessions = tuple(
         PlannedSession(
@@ -71,7 +73,10 @@ def read_plan(folder: Path, *, out: Path) -> ExportPlan:
             revision=session["revision"],
             cameras={int(i): _camera(values) for i, values in session["cameras"].items()},
             boxes=boxes[number],
-            hulls=hulls[number],
+            meshes=meshes[number],
+            box_ids=tuple(session["box_ids"]),
+            box_names=tuple(session["box_names"]),
+            drawn_round=tuple(session["drawn_round"]),
             class_of_box=tuple(session["class_of_box"]),
         )
         for number, session in enumerate(document["sessions"])
@@ -80,7 +85,7 @@ def read_plan(folder: Path, *, out: Path) -> ExportPlan:
         out=out,
         format=document["format"],
         options=ExportOptions.model_validate(document["options"]),
-        class_names=tuple(document["class_names"]),
+        classes=tuple(_class(values) for values in document["classes"]),
         sessions=sessions,
         frames=PlannedFrames(**numbers, names=texts["names"], stems=texts["stems"], sources=texts["sources"]),
         shards=tuple((start, stop) for start, stop in document["shards"]),
@@ -93,13 +98,16 @@ def _document(plan: ExportPlan) -> bytes:
             "version": _VERSION,
             "format": plan.format,
             "options": plan.options.model_dump(mode="json"),
-            "class_names": plan.class_names,
+            "classes": [asdict(a_class) for a_class in plan.classes],
             "sessions": [
                 {
                     "id": s.id,
                     "name": s.name,
                     "revision": s.revision,
                     "cameras": {str(i): asdict(camera) for i, camera in s.cameras.items()},
+                    "box_ids": s.box_ids,
+                    "box_names": s.box_names,
+                    "drawn_round": s.drawn_round,
                     "class_of_box": s.class_of_box,
                 }
                 for s in plan.sessions
@@ -121,27 +129,40 @@ def _arrays(plan: ExportPlan) -> dict[str, np.ndarray]:
     for number, session in enumerate(plan.sessions):
         Ts, sizes = stack(list(session.boxes))
         arrays |= {f"Ts_world_box_{number}": Ts, f"sizes_{number}": sizes}
-        hulls = [hull for hull in session.hulls if hull is not None]
-        if hulls:
-            # A session without hulls has none of these, so that its plan is what it was before there were any.
-            counts = [(0, 0) if hull is None else (len(hull.vertices_world), len(hull.faces)) for hull in session.hulls]
+        meshes = [mesh for mesh in session.meshes if mesh is not None]
+        if meshes:
+            # A session whose labels are drawn round its boxes has none of these.
+            counts = [
+                (0, 0) if mesh is None else (len(mesh.vertices_world), len(mesh.faces)) for mesh in session.meshes
+            ]
             arrays |= {
-                f"hull_counts_{number}": np.array(counts, dtype=np.int64),
-                f"hull_vertices_{number}": np.concatenate([hull.vertices_world for hull in hulls]),
-                f"hull_faces_{number}": np.concatenate([hull.faces for hull in hulls]),
+                f"mesh_counts_{number}": np.array(counts, dtype=np.int64),
+                f"mesh_vertices_{number}": np.concatenate([mesh.vertices_world for mesh in meshes]),
+                f"mesh_faces_{number}": np.concatenate([mesh.faces for mesh in meshes]),
             }
     return arrays
 
 
-def _hulls(arrays: Mapping[str, np.ndarray], number: int, boxes: int) -> tuple[Mesh | None, ...]:
-    """The hulls of a session's boxes, None for those without one."""
-    if f"hull_counts_{number}" not in arrays:
+def _meshes(arrays: Mapping[str, np.ndarray], number: int, boxes: int) -> tuple[Mesh | None, ...]:
+    """The meshes of a session's boxes, None for those without one."""
+    if f"mesh_counts_{number}" not in arrays:
         return (None,) * boxes
-    counts = arrays[f"hull_counts_{number}"]
+    counts = arrays[f"mesh_counts_{number}"]
     ends = np.cumsum(counts, axis=0)[:-1]
-    vertices = np.split(arrays[f"hull_vertices_{number}"], ends[:, 0])
-    faces = np.split(arrays[f"hull_faces_{number}"], ends[:, 1])
+    vertices = np.split(arrays[f"mesh_vertices_{number}"], ends[:, 0])
+    faces = np.split(arrays[f"mesh_faces_{number}"], ends[:, 1])
     return tuple(Mesh(v, f) if len(f) else None for v, f in zip(vertices, faces, strict=True))
+
+
+def _class(values: dict[str, Any]) -> PlannedClass:
+    symmetry = values["symmetry"]
+    rotations = tuple((tuple(axis), order) for axis, order in symmetry["rotations"])
+    axis = None if symmetry["axis"] is None else tuple(symmetry["axis"])
+    return PlannedClass(
+        name=values["name"],
+        keypoints=tuple(Keypoint(point["name"], tuple(point["place"])) for point in values["keypoints"]),
+        symmetry=Symmetry(**symmetry | {"rotations": rotations, "axis": axis}),
+    )
 
 
 def _camera(values: dict[str, Any]) -> Camera:

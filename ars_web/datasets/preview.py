@@ -9,7 +9,10 @@ from jaxtyping import UInt8
 
 from ars_web.datasets.drawing import Canvas, Color, color_of
 from ars_web.datasets.file_names import stems
-from ars_web.datasets.samples import FrameLabel, frame_labels, hulls_of, labels_in_frames
+from ars_web.datasets.format_picture import draw_format
+from ars_web.datasets.options import ExportOptions
+from ars_web.datasets.samples import FrameLabel, frame_labels, labels_in_frames
+from ars_web.datasets.shapes import meshes_of
 from ars_web.errors import BadInput, NotFound, StoreError
 from ars_web.recordings.images import read_image
 from ars_web.recordings.stored_images import local
@@ -19,13 +22,20 @@ HARDLY_VISIBLE = 0.05
 """Labels that are hidden nearly whole are drawn thinly."""
 
 
-def preview(snapshot: SessionSnapshot, out: Path, *, count: int = 6) -> list[Path]:
+def preview(
+    snapshot: SessionSnapshot,
+    out: Path,
+    *,
+    count: int = 6,
+    format: str | None = None,  # noqa: A002 - the contract's name
+) -> list[Path]:
     """Write `count` frames with their labels drawn into the folder `out`, as PNG; the files, in the frames' order.
 
-    The frames are spread evenly over those in which a box is seen; there may be fewer of them.
+    They are drawn as `format` holds them; None: outlines, edges, boxes and visible shares. The frames are spread
+    evenly over those in which a box is seen; there may be fewer of them.
 
     Raises:
-        BadInput: no box of the session is in any of its images.
+        BadInput: no box of the session is in any of its images, or there is no such format.
         BadFile: one of the chosen images cannot be read.
         StoreError: `out` cannot be written.
     """
@@ -36,10 +46,13 @@ def preview(snapshot: SessionSnapshot, out: Path, *, count: int = 6) -> list[Pat
         boxes = len(snapshot.state.boxes)
         seen = f"none of its {boxes} boxes is in any image" if boxes else "it has no boxes"
         raise BadInput(f"session {snapshot.id} has nothing to draw: {seen}; put a box where the camera looked")
-    names = stems(snapshot.frames.names)
+    names, usual = stems(snapshot.frames.names), ExportOptions.model_validate({})
     written: list[Path] = []
     for index in spread(indices, count):
-        picture = draw_frame(snapshot, index)
+        if format is None:
+            picture = draw_frame(snapshot, index)
+        else:
+            picture = draw_format(snapshot, index, format=format, options=usual)
         ok, content = cv2.imencode(".png", picture)
         assert ok, "OpenCV cannot encode PNG"
         path = out / f"{names[index]}.png"
@@ -60,7 +73,7 @@ def labelled_frames(snapshot: SessionSnapshot) -> list[int]:
         frames.camera_ids,
         frames.Ts_world_camera,
         boxes,
-        hulls=hulls_of(snapshot, shape=None),
+        meshes=meshes_of(snapshot, shape=None),
         with_visible=False,
     )
     return np.flatnonzero(~np.isnan(table.bbox[..., 0]).all(axis=1)).tolist() if boxes else []

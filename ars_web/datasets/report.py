@@ -7,8 +7,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from ars_web import __version__
 from ars_web.datasets.options import ExportOptions
-from ars_web.datasets.plan import ExportPlan
-from ars_web.datasets.registry import WRITERS
+from ars_web.datasets.planned import ExportPlan
+from ars_web.datasets.registry import WRITERS, writer_of
 from ars_web.datasets.samples import DROP_REASONS
 from ars_web.datasets.splits import SPLITS
 from ars_web.geometry.camera import rectified
@@ -72,12 +72,13 @@ class ExportReport(_Record):
     version: str = __version__
     options: ExportOptions
     shape: str = Field(
-        description="what the labels are drawn round: box, hull, or `hull or box` where some have no hull"
+        description="what the labels are drawn round: box, hull, mesh, or such as `hull or box` where some have no hull"
     )
     sessions: list[SessionUsed]
     classes: list[ClassUsed]
     splits: dict[str, SplitCounts]
     dropped: dict[str, int] = Field(description="boxes of frames without a label, by the first rule that applied")
+    losses: list[str] = Field(description="what of the session the format cannot hold, one line each")
     rectified_cameras: list[RectifiedCamera]
     label_files: int
     sha256: str = Field(
@@ -114,6 +115,7 @@ def report_of(plan: ExportPlan, shards: Iterable[ShardReport], joined: Mapping[s
         classes=[ClassUsed(id=place, name=name) for place, name in enumerate(plan.class_names)],
         splits=splits,
         dropped=dropped,
+        losses=list(writer_of(plan.format).losses(plan)),
         rectified_cameras=_rectified_cameras(plan) if rectify else [],
         label_files=len(files),
         sha256=_dataset_sha256(files),
@@ -121,8 +123,8 @@ def report_of(plan: ExportPlan, shards: Iterable[ShardReport], joined: Mapping[s
 
 
 def _shape(plan: ExportPlan) -> str:
-    has_hull = {hull is not None for session in plan.sessions for hull in session.hulls}
-    return "hull or box" if len(has_hull) == 2 else "hull" if has_hull == {True} else "box"
+    kinds = {shape for session in plan.sessions for shape in session.drawn_round}
+    return " or ".join(shape for shape in ("mesh", "hull", "box") if shape in kinds) or "box"
 
 
 def used_splits(plan: ExportPlan) -> list[str]:

@@ -4,13 +4,15 @@ This is the only caller of the geometry for exports, previews and the API's labe
 written comes from the same functions.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ars_web.datasets.options import ExportOptions
+from ars_web.datasets.shape_rings import columns_of, rings_of_shapes
+from ars_web.datasets.shapes import PosedShapes, by_camera, check_shape, meshes_of
 from ars_web.errors import BadInput, NotFound
 from ars_web.geometry import labels as geometry
 from ars_web.geometry.box import Box
@@ -19,13 +21,10 @@ from ars_web.geometry.labels import BoxLabels
 from ars_web.geometry.mesh import Mesh
 from ars_web.geometry.mesh_labels import labels_of_meshes
 from ars_web.geometry.mesh_outlines import mesh_outlines
-from ars_web.geometry.occlusion import visible_fractions
+from ars_web.geometry.shape_occlusion import visible_shares
 from ars_web.sessions.model import FrameTable, SessionSnapshot
 
-SHAPES: tuple[str, ...] = ("box", "hull")
-"""What labels are drawn round today. A box without a stored hull is itself its shape, whatever was asked for."""
-
-Hulls = Sequence[Mesh | None]
+Meshes = Sequence[Mesh | None]
 """In the world, of each box; None for those whose labels are drawn round the box."""
 
 DROP_REASONS: tuple[str, ...] = ("not_in_image", "area", "truncation", "visibility")
@@ -40,9 +39,8 @@ class LabelTable:
         bbox: (n, b, 4) of the part in the image; NaN where no part is in it.
         bbox_amodal: (n, b, 4) of the whole object, unclipped; NaN where nothing is in front of the camera.
         truncated: (n, b) share of the amodal outline outside the image; 1 where bbox is NaN.
-        visible: (n, b) share of the in-image outline that no nearer box hides; NaN where bbox is NaN or where it
-            was not asked for. Here hulls count as their boxes: of each box the part over `bbox`, hidden by the other
-            boxes as far as their own `bbox` reaches.
+        visible: (n, b) share of the in-image outline that no nearer shape hides; NaN where bbox is NaN or where it
+            was not asked for. A shape is what labels are drawn round: the box, the hull or the mesh.
     """
 
     bbox: Float[np.ndarray, "n b 4"]
@@ -98,46 +96,56 @@ class PreviewLabel:
     truncated: float
 
 
-def hulls_of(snapshot: SessionSnapshot, *, shape: str | None) -> list[Mesh | None]:
-    """The stored hulls of a session's boxes, by ascending box id; None where there is none, or for the shape `box`."""
-    state = snapshot.state
-    return [
-        Mesh(*snapshot.hulls[digest].in_world(box.box)) if shape != "box" and (digest := box.hull) is not None else None
-        for _, box in sorted(state.boxes.items())
-    ]
-
-
 def labels_in_frames(
     cameras: Mapping[int, Camera],
     camera_ids: Int[np.ndarray, "n"],
     Ts_world_camera: Float[np.ndarray, "n 4 4"],
     boxes: Sequence[Box],
     *,
-    hulls: Hulls | None = None,
+    meshes: Meshes | None = None,
     with_visible: bool = True,
     step: int = 8,
 ) -> LabelTable:
     """Labels of every box, or its hull, in every frame; frames are taken together camera by camera.
 
-    `with_visible` False spares the search for nearer boxes; `step` is its grid in pixels.
+    `with_visible` False spares the search for nearer shapes; `step` is its grid in pixels.
     """
     n, b = len(camera_ids), len(boxes)
     table = LabelTable(np.full((n, b, 4), np.nan), np.full((n, b, 4), np.nan), np.ones((n, b)), np.full((n, b), np.nan))
-    meshes, plain = _columns(hulls, b)
-    for camera, rows in _by_camera(cameras, camera_ids):
+    shapes = list(meshes) if meshes is not None else [None] * b
+    solids, plain = columns_of(shapes)
+    for camera, rows in by_camera(cameras, camera_ids):
         Ts = Ts_world_camera[rows]
         found: list[tuple[list[int], BoxLabels]] = []
         if plain:
             found.append((plain, geometry.labels_of_boxes(camera, Ts, [boxes[i] for i in plain])))
-        if meshes:
-            found.append((list(meshes), labels_of_meshes(camera, Ts, list(meshes.values()))))
+        if solids:
+            found.append((list(solids), labels_of_meshes(camera, Ts, list(solids.values()))))
         for columns, labels in found:
             place = rows[:, None], np.array(columns)
             table.bbox[place], table.bbox_amodal[place] = labels.bbox, labels.bbox_amodal
             table.truncated[place] = labels.truncated
         if with_visible and b:
-            table.visible[rows] = visible_fractions(camera, Ts, list(boxes), table.bbox[rows], step=step)
+            table.visible[rows] = visible_shares(camera, Ts, boxes, shapes, table.bbox[rows], step=step)
     return table
+
+
+def labels_of_shapes(shapes: PosedShapes, *, with_visible: bool = True, step: int = 8) -> LabelTable:
+    """The same of shapes that know where they are seen from."""
+    return labels_in_frames(
+        shapes.cameras,
+        shapes.camera_ids,
+        shapes.Ts_world_camera,
+        shapes.boxes,
+        meshes=shapes.meshes,
+        with_visible=with_visible,
+        step=step,
+    )
+
+
+def outlines_of_shapes(shapes: PosedShapes, wanted: Bool[np.ndarray, "n b"]) -> Outlines:
+    """The outlines that `outlines_in_frames` draws, of shapes that know where they are seen from."""
+    return Outlines(*rings_of_shapes(shapes, wanted, of_boxes=geometry.outlines, of_meshes=mesh_outlines))
 
 
 def outlines_in_frames(
@@ -147,33 +155,12 @@ def outlines_in_frames(
     boxes: Sequence[Box],
     wanted: Bool[np.ndarray, "n b"],
     *,
-    hulls: Hulls | None = None,
+    meshes: Meshes | None = None,
 ) -> Outlines:
-    """Outlines of the boxes, or their hulls, in the frames where they are wanted."""
-    if not wanted.any():
-        return Outlines(np.zeros((0, 2)), np.zeros(wanted.size + 1, dtype=np.int64))
-    lengths = np.zeros(wanted.shape, dtype=np.int64)
-    meshes, plain = _columns(hulls, len(boxes))
-    found: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = []
-    for camera, rows in _by_camera(cameras, camera_ids):
-        Ts = Ts_world_camera[rows]
-        if plain:
-            of_boxes = [boxes[i] for i in plain]
-            columns = np.array(plain)
-            found.append((rows, columns, *geometry.outlines(camera, Ts, of_boxes, wanted[np.ix_(rows, columns)])))
-        if meshes:
-            columns = np.array(list(meshes))
-            of_hulls = list(meshes.values())
-            found.append((rows, columns, *mesh_outlines(camera, Ts, of_hulls, wanted[np.ix_(rows, columns)])))
-    for rows, columns, _, offsets in found:
-        lengths[np.ix_(rows, columns)] = np.diff(offsets).reshape(len(rows), len(columns))
-    starts = np.concatenate([[0], np.cumsum(lengths)])
-    joined = np.empty((starts[-1], 2))
-    for rows, columns, points, offsets in found:
-        # Where each ring's points go: as far from its start there as from its start here.
-        at = starts[:-1].reshape(wanted.shape)[np.ix_(rows, columns)].ravel()
-        joined[np.repeat(at - offsets[:-1], np.diff(offsets)) + np.arange(len(points))] = points
-    return Outlines(joined, starts)
+    """Outlines of the boxes, or their meshes, in the frames where they are wanted."""
+    none = np.zeros((len(boxes), 0, 3))
+    shapes = PosedShapes(cameras, camera_ids, Ts_world_camera, boxes, meshes or [None] * len(boxes), none)
+    return outlines_of_shapes(shapes, wanted)
 
 
 def label_table(
@@ -187,7 +174,7 @@ def label_table(
         frames.camera_ids[rows],
         frames.Ts_world_camera[rows],
         [snapshot.state.boxes[i].box for i in sorted(snapshot.state.boxes)],
-        hulls=hulls_of(snapshot, shape=shape),
+        meshes=meshes_of(snapshot, shape=shape),
         step=step,
     )
 
@@ -221,16 +208,16 @@ def frame_labels(snapshot: SessionSnapshot, index: int, *, shape: str | None = N
         NotFound: the session has no such frame.
         BadInput: `shape` is `mesh`, or no shape at all.
     """
-    check_shape(shape)
+    check_shape(shape, [snapshot])
     frames = snapshot.frames
     if not 0 <= index < len(frames):
         raise NotFound(f"session {snapshot.id} has no frame {index}; its frames are 0 to {len(frames) - 1}")
     boxes = [virtual for _, virtual in sorted(snapshot.state.boxes.items())]
-    shapes, hulls = [virtual.box for virtual in boxes], hulls_of(snapshot, shape=shape)
+    shapes, meshes = [virtual.box for virtual in boxes], meshes_of(snapshot, shape=shape)
     camera_ids, Ts = frames.camera_ids[[index]], frames.Ts_world_camera[[index]]
-    table = labels_in_frames(snapshot.cameras, camera_ids, Ts, shapes, hulls=hulls)
+    table = labels_in_frames(snapshot.cameras, camera_ids, Ts, shapes, meshes=meshes)
     seen = ~np.isnan(table.bbox[..., 0])
-    rings = outlines_in_frames(snapshot.cameras, camera_ids, Ts, shapes, seen, hulls=hulls)
+    rings = outlines_in_frames(snapshot.cameras, camera_ids, Ts, shapes, seen, meshes=meshes)
     camera = snapshot.cameras[int(camera_ids[0])]
     found: list[FrameLabel] = []
     for column, virtual in enumerate(boxes):
@@ -281,28 +268,6 @@ def preview_labels(
             )
         found.append(labels)
     return found
-
-
-def check_shape(shape: str | None) -> None:
-    """Raises BadInput for a label shape that cannot be made."""
-    if shape == "mesh":
-        raise BadInput("shape 'mesh' needs a mesh for each class and this session has none; use 'box' or 'hull'")
-    if shape not in (None, "box", "hull"):
-        raise BadInput(f"shape {shape!r} is unknown; known are box, hull and mesh")
-
-
-def _columns(hulls: Hulls | None, b: int) -> tuple[dict[int, Mesh], list[int]]:
-    """The meshes by their column, and the columns without one."""
-    meshes = {i: hull for i, hull in enumerate(hulls or ()) if hull is not None}
-    return meshes, [i for i in range(b) if i not in meshes]
-
-
-def _by_camera(
-    cameras: Mapping[int, Camera], camera_ids: Int[np.ndarray, "n"]
-) -> Iterator[tuple[Camera, Int[np.ndarray, "m"]]]:
-    """Each camera that occurs, with the rows of its frames."""
-    for camera_id in np.unique(camera_ids).tolist():
-        yield cameras[camera_id], np.flatnonzero(camera_ids == camera_id)
 
 
 def _bbox_or_none(bbox: Float[np.ndarray, "4"]) -> tuple[float, float, float, float] | None:

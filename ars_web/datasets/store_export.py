@@ -20,9 +20,10 @@ from ars_web.datasets import cluster as clusters
 from ars_web.datasets.assembly import DOCUMENT, description_of
 from ars_web.datasets.jobs import SHOWN_IMAGES, local_executor
 from ars_web.datasets.options import ExportOptions
-from ars_web.datasets.plan import ExportPlan, plan_export
+from ars_web.datasets.plan import plan_export
 from ars_web.datasets.plan_files import FILES as PLAN_FILES
 from ars_web.datasets.plan_files import digest_of, write_plan
+from ars_web.datasets.planned import ExportPlan
 from ars_web.datasets.registry import writer_of
 from ars_web.datasets.report import ExportReport, ShardReport, report_of
 from ars_web.datasets.shard_runs import Workplace, run_shards

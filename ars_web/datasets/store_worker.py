@@ -13,9 +13,9 @@ from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from ars_web.datasets.plan import ExportPlan
 from ars_web.datasets.plan_files import FILES as PLAN_FILES
 from ars_web.datasets.plan_files import read_plan
+from ars_web.datasets.planned import ExportPlan
 from ars_web.datasets.worker import fill_shard, watch
 from ars_web.recordings.stores import StoreFolder, store_folder
 

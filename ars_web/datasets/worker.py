@@ -1,6 +1,7 @@
 """One shard of an export, done from the partial folder alone: what a worker process runs."""
 
 import os
+import shutil
 import signal
 import threading
 import time
@@ -16,13 +17,14 @@ from jaxtyping import Int
 from ars_web.datasets.counting import select_labels, split_counts
 from ars_web.datasets.file_names import safe
 from ars_web.datasets.images import image_name, place_image
-from ars_web.datasets.plan import ExportPlan
+from ars_web.datasets.label_functions import label_function
 from ars_web.datasets.plan_files import read_plan
+from ars_web.datasets.planned import ExportPlan
 from ars_web.datasets.registry import writer_of
 from ars_web.datasets.report import ShardReport
-from ars_web.datasets.samples import Outlines, outlines_in_frames
+from ars_web.datasets.samples import outlines_of_shapes
 from ars_web.datasets.splits import SPLITS
-from ars_web.datasets.writers.writer import Shard
+from ars_web.datasets.writers.writer import Shard, Writer
 from ars_web.errors import Cancelled
 
 CANCEL = "cancel"
@@ -101,11 +103,16 @@ def fill_shard(plan: ExportPlan, number: int, tmp: Path, check: Callable[[], Non
     """
     for name in ("files", "fragments"):
         (tmp / name).mkdir()
-    shard, dropped = _shard(plan, number)
+    writer = writer_of(plan.format)
+    # Images that the writer puts into its own files are no part of the dataset by themselves.
+    images = tmp / ("files" if writer.image_folder is not None else "images")
+    shard, dropped = _shard(plan, number, images)
     check()
     if plan.options.images != "none":
-        _place_images(plan, number, shard, tmp / "files", check)
-    digests = writer_of(plan.format).write(shard, tmp / "files", tmp / "fragments")
+        _place_images(plan, number, shard, check)
+    digests = writer.write(shard, tmp / "files", tmp / "fragments")
+    if writer.image_folder is None:
+        shutil.rmtree(images, ignore_errors=True)
     counts = split_counts(shard.splits, shard.keep, shard.class_of_box.tolist(), shard.class_names)
     report = ShardReport(splits=counts, dropped=dropped, digests=digests)
     (tmp / "shard.json").write_text(report.model_dump_json(), encoding="utf-8")
@@ -133,40 +140,58 @@ def watch(asked: Callable[[], bool], *, every: float = _LOOK_EVERY) -> Callable[
     return check
 
 
-def _shard(plan: ExportPlan, number: int) -> tuple[Shard, dict[str, int]]:
-    """The shard's frames with their labels, and how many labels were dropped by reason."""
+def _shard(plan: ExportPlan, number: int, images: Path) -> tuple[Shard, dict[str, int]]:
+    """The shard's frames with their labels, and how many labels were dropped by reason; `images` is the folder below
+    which its images lie while it is written."""
     start, stop = plan.shards[number]
     frames, writer = plan.frames, writer_of(plan.format)
-    session = plan.sessions[int(frames.session[start])]
-    selection = select_labels(plan, start, stop, with_visible=writer.with_visible)
-    cameras, keep = selection.cameras, selection.keep
-    camera_ids, Ts = frames.camera_id[start:stop], frames.Ts_world_camera[start:stop]
-    wanted = keep if writer.with_outlines else np.zeros_like(keep)
-    outlines: Outlines = outlines_in_frames(cameras, camera_ids, Ts, session.boxes, wanted, hulls=session.hulls)
+    session_number = int(frames.session[start])
+    session = plan.sessions[session_number]
+    selection = select_labels(plan, slice(start, stop), with_visible=writer.with_visible)
+    shapes, keep = selection.shapes, selection.keep
     sizes: Int[np.ndarray, "n 2"] = np.array(
-        [(cameras[i].width, cameras[i].height) for i in camera_ids.tolist()], dtype=np.int64
+        [(shapes.cameras[i].width, shapes.cameras[i].height) for i in shapes.camera_ids.tolist()], dtype=np.int64
     )
+    splits = [SPLITS[i] for i in frames.split[start:stop].tolist()]
     sources, stems = frames.sources[start:stop], frames.stems[start:stop]
+    names = [
+        image_name(stem, source, only_jpeg=writer.only_jpeg, only_png=writer.only_png)
+        for stem, source in zip(stems, sources, strict=True)
+    ]
+    has_images = plan.options.images != "none"
+    folders = {split: images / _image_folder(writer, split, session_number) for split in set(splits)}
+    files = [folders[split] / name for split, name in zip(splits, names, strict=True)]
     return (
         Shard(
             first=start,
-            splits=[SPLITS[i] for i in frames.split[start:stop].tolist()],
+            session_number=session_number,
+            session=session,
+            sessions=plan.sessions,
+            options=plan.options,
+            splits=splits,
             stems=stems,
-            image_names=[
-                image_name(stem, source, only_jpeg=writer.only_jpeg)
-                for stem, source in zip(stems, sources, strict=True)
-            ],
+            image_names=names,
+            image_files=files if has_images else (),
             identities=[identity(name, source) for name, source in zip(frames.names[start:stop], sources, strict=True)],
+            frame_names=frames.names[start:stop],
+            frame_indices=frames.index[start:stop],
             sizes=sizes,
-            class_names=plan.class_names,
+            classes=plan.classes,
             class_of_box=np.array(session.class_of_box, dtype=np.int64),
             most_boxes=max(len(s.boxes) for s in plan.sessions),
+            shapes=shapes,
             table=selection.table,
             keep=keep,
-            outlines=outlines,
+            outlines=outlines_of_shapes(shapes, keep if writer.with_outlines else np.zeros_like(keep)),
+            marks={name: label_function(name).draw(shapes, selection.table, keep) for name in writer.label_functions},
         ),
         selection.dropped,
     )
+
+
+def _image_folder(writer: Writer, split: str, session: int) -> str:
+    """Where images of a split lie below the folder of all files, or of those that are put into others."""
+    return split if writer.image_folder is None else writer.image_folder(split).format(session=session)
 
 
 def identity(name: str, source: str) -> str:
@@ -179,19 +204,17 @@ def identity(name: str, source: str) -> str:
     return f"{safe(scene.name)}!{name}"
 
 
-def _place_images(plan: ExportPlan, number: int, shard: Shard, files: Path, check: Callable[[], None]) -> None:
+def _place_images(plan: ExportPlan, number: int, shard: Shard, check: Callable[[], None]) -> None:
     start, _ = plan.shards[number]
-    frames, image_folder = plan.frames, writer_of(plan.format).image_folder
-    cameras = plan.sessions[int(frames.session[start])].cameras
-    folders = {split: files / image_folder(split) for split in sorted(set(shard.splits))}
-    for folder in folders.values():
+    frames, cameras = plan.frames, shard.session.cameras
+    for folder in sorted({file.parent for file in shard.image_files}):
         folder.mkdir(parents=True, exist_ok=True)
     stamps: list[tuple[int, int]] = list(map(tuple, frames.stamps[start : start + len(shard.stems)].tolist()))
-    for i, (split, name, stamp) in enumerate(zip(shard.splits, shard.image_names, stamps, strict=True)):
+    for i, (target, stamp) in enumerate(zip(shard.image_files, stamps, strict=True)):
         check()
         place_image(
             frames.sources[start + i],
-            f"{folders[split]}/{name}",
+            str(target),
             camera=cameras[int(frames.camera_id[start + i])],
             stamp=stamp,
             images=plan.options.images,

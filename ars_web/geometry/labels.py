@@ -1,6 +1,6 @@
 """Labels of boxes in images: the one place that decides where a virtual box appears in a frame."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +28,9 @@ RINGS = silhouette_rings()
 
 BOX_FRAMES = 4096
 """Boxes times frames that are worked on at once: their shadows stay in the processor's cache."""
+
+CutRings = tuple[Float[np.ndarray, "_ 2"], Int[np.ndarray, "_"]]
+"""The points of rings one after the other, and how many each has."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,20 +140,44 @@ def outlines_of_stacked(
     tolerance: float = 0.1,
 ) -> tuple[Float[np.ndarray, "k 2"], Int[np.ndarray, "n*b+1"]]:
     """The same for boxes as `box.stack` gives them; they are not checked."""
+    lens = lens_tables(camera).lens
+
+    def cut(points: Float[np.ndarray, "_ 2"], lengths: Int[np.ndarray, "_"]) -> CutRings:
+        return cut_kernels.cut_rings(lens.width, lens.height, points, lengths)
+
+    found = rings_in_frames(camera, Ts_world_camera, Ts_world_box, sizes, wanted, cut, tolerance=tolerance)
+    points = np.concatenate([np.zeros((0, 2)), *(ring for ring, _ in found)])
+    lengths = np.concatenate([np.zeros(1, np.int64), *(lengths for _, lengths in found)])
+    return points, np.cumsum(lengths)
+
+
+def rings_in_frames(
+    camera: Camera,
+    Ts_world_camera: Float[np.ndarray, "n 4 4"],
+    Ts_world_box: Float[np.ndarray, "b 4 4"],
+    sizes: Float[np.ndarray, "b 3"],
+    wanted: Bool[np.ndarray, "n b"],
+    cut: Callable[[Float[np.ndarray, "_ 2"], Int[np.ndarray, "_"]], CutRings],
+    *,
+    tolerance: float,
+) -> list[CutRings]:
+    """What `cut` makes of the whole rings of boxes, row by row, a block of frames after the other: it is given the
+    points of all rings of a block, and how many each has.
+
+    Raises:
+        BadInput: `tolerance` is below FINEST_TOLERANCE.
+    """
     _check_tolerance(tolerance)
     n, b, tables = len(Ts_world_camera), len(sizes), lens_tables(camera)
 
-    def rings(frames: slice) -> tuple[np.ndarray, np.ndarray]:
+    def rings(frames: slice) -> CutRings:
         polygons, corners = _shadows(Ts_world_camera[frames], Ts_world_box, sizes)
         points, lengths, _ = lens_kernels.rings_of_shadows(
             tables.lens, tables.bends, polygons, corners, np.ascontiguousarray(wanted[frames]), tolerance
         )
-        return cut_kernels.cut_rings(tables.lens.width, tables.lens.height, points, lengths)
+        return cut(points, lengths)
 
-    found = over_blocks(rings, n, block=_block(b))
-    points = np.concatenate([np.zeros((0, 2)), *(ring for ring, _ in found)])
-    lengths = np.concatenate([np.zeros(1, np.int64), *(lengths for _, lengths in found)])
-    return points, np.cumsum(lengths)
+    return over_blocks(rings, n, block=_block(b))
 
 
 def outline(camera: Camera, T_world_camera: Transform, box: Box, *, tolerance: float = 0.1) -> Float[np.ndarray, "k 2"]:

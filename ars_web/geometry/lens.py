@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from ars_web.geometry import camera as cameras
 from ars_web.geometry.camera import Camera
@@ -36,8 +36,15 @@ class LensTables:
 
     def bends_within(self, radii: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
         """Bounds on the second derivative of a straight line's image in any direction, for lines within these radii."""
+        return self.bends[2, self._bins(radii)]
+
+    def bends_across_within(self, radii: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
+        """The same across the chords of the image."""
+        return self.bends[0, self._bins(radii)]
+
+    def _bins(self, radii: Float[np.ndarray, "n"]) -> Int[np.ndarray, "n"]:
         place = BINS + np.log(np.maximum(radii, 1e-30) / self.lens.rim) * self.lens.bins_per_e
-        return self.bends[2, np.clip(np.floor(place), 0, BINS - 1).astype(np.int64)]
+        return np.clip(np.floor(place), 0, BINS - 1).astype(np.int64)
 
 
 @lru_cache(maxsize=64)

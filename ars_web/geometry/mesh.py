@@ -74,6 +74,18 @@ class Mesh:
         centre = (self.vertices_world.min(axis=0) + self.vertices_world.max(axis=0)) / 2
         return centre, float(np.linalg.norm(self.vertices_world - centre, axis=1).max())
 
+    @cached_property
+    def hull_vertices_world(self) -> Float[np.ndarray, "h 3"]:
+        """Those vertices that span the convex hull; all that faces have where a mesh is flat."""
+        # SciPy takes half a second to load. manifold3d is there already, but its hulls leave out corners now and then.
+        from scipy.spatial import ConvexHull, QhullError
+
+        used = self.vertices_world[np.unique(self.faces)]
+        try:
+            return np.ascontiguousarray(used[ConvexHull(used).vertices])
+        except QhullError:
+            return used
+
 
 def edges_of_faces(faces: Int[np.ndarray, "f 3"]) -> Int[np.ndarray, "e 4"]:
     """Each edge of a closed mesh with its two faces: the smaller of its vertices, the larger, the face that runs along

@@ -1,4 +1,4 @@
-"""Outlines of closed meshes in images: one ring round the part of an object's hull that lies in the image."""
+"""Outlines of closed meshes in images: rings round the part of an object's hull that lies in the image, or one."""
 
 from collections.abc import Sequence
 
@@ -8,10 +8,12 @@ from manifold3d import CrossSection, FillRule
 
 from ars_web.geometry import cut_kernels, region_kernels
 from ars_web.geometry.camera import Camera
+from ars_web.geometry.frame_blocks import over_blocks
 from ars_web.geometry.lens import lens_tables
 from ars_web.geometry.mesh import Mesh
-from ars_web.geometry.mesh_labels import check_tolerance, curves_of_mesh
+from ars_web.geometry.mesh_labels import BLOCK, check_tolerance, curves_of_mesh
 from ars_web.geometry.rigid_transform import Transform
+from ars_web.geometry.rings import Rings, rings_of
 
 
 def mesh_outlines(
@@ -31,16 +33,27 @@ def mesh_outlines(
     Raises:
         BadInput: `tolerance` is below FINEST_TOLERANCE.
     """
-    check_tolerance(tolerance)
-    n, b = len(Ts_world_camera), len(meshes)
-    rings: list[Float[np.ndarray, "k 2"]] = [np.zeros((0, 2))] * (n * b)
-    Ts = np.array(Ts_world_camera, dtype=np.float64, order="C")
-    for column, mesh in enumerate(meshes):
-        rows = np.flatnonzero(wanted[:, column])
-        for row, ring in zip(rows.tolist(), _rings(camera, Ts[rows], mesh, tolerance), strict=True):
-            rings[row * b + column] = ring
+    regions = _regions(camera, Ts_world_camera, meshes, wanted, tolerance)
+    rings = [joined(region) for region in regions]
     lengths = [len(ring) for ring in rings]
     return np.concatenate([np.zeros((0, 2)), *rings]), np.cumsum([0, *lengths])
+
+
+def mesh_regions(
+    camera: Camera,
+    Ts_world_camera: Float[np.ndarray, "n 4 4"],
+    meshes: Sequence[Mesh],
+    wanted: Bool[np.ndarray, "n b"],
+    *,
+    tolerance: float = 0.1,
+) -> Rings:
+    """The same parts as separate rings: of each piece the ring round it, counter-clockwise as seen in the image
+    (y down), then those round its holes, clockwise; the largest piece comes first, and of its holes the largest.
+
+    Raises:
+        BadInput: `tolerance` is below FINEST_TOLERANCE.
+    """
+    return rings_of(_regions(camera, Ts_world_camera, meshes, wanted, tolerance))
 
 
 def mesh_outline(
@@ -59,35 +72,104 @@ def mesh_outline(
     return ring
 
 
-def _rings(
+def _regions(
+    camera: Camera,
+    Ts_world_camera: Float[np.ndarray, "n 4 4"],
+    meshes: Sequence[Mesh],
+    wanted: Bool[np.ndarray, "n b"],
+    tolerance: float,
+) -> list[list[Float[np.ndarray, "_ 2"]]]:
+    """The rings of each mesh in each frame, row by row, as `mesh_regions` orders them."""
+    check_tolerance(tolerance)
+    n, b = len(Ts_world_camera), len(meshes)
+    regions: list[list[Float[np.ndarray, "_ 2"]]] = [[] for _ in range(n * b)]
+    Ts = np.array(Ts_world_camera, dtype=np.float64, order="C")
+    for column, mesh in enumerate(meshes):
+        rows = np.flatnonzero(wanted[:, column])
+
+        def find(some: slice, rows: Int[np.ndarray, "_"] = rows, mesh: Mesh = mesh, column: int = column) -> None:
+            found = _regions_of_mesh(camera, Ts[rows[some]], mesh, tolerance)
+            for row, region in zip(rows[some].tolist(), found, strict=True):
+                regions[row * b + column] = region
+
+        over_blocks(find, len(rows), block=BLOCK)
+    return regions
+
+
+def _regions_of_mesh(
     camera: Camera, Ts_world_camera: Float[np.ndarray, "n 4 4"], mesh: Mesh, tolerance: float
-) -> list[Float[np.ndarray, "k 2"]]:
+) -> list[list[Float[np.ndarray, "_ 2"]]]:
     # Half of the tolerance for the chords of bent edges, half for points left out.
     tables, every = lens_tables(camera), np.ones(len(Ts_world_camera), dtype=np.bool_)
     curves = curves_of_mesh(tables, Ts_world_camera, mesh, every, tolerance / 2)
     points, lengths, counts = region_kernels.join_loops(*curves)
     # Cut one by one, loops still run round each point of the image as often.
     points, lengths = cut_kernels.cut_rings(tables.lens.width, tables.lens.height, points, lengths)
-    loops = np.split(points, np.cumsum(lengths)[:-1]) if len(lengths) else []
+    starts = np.cumsum([0, *lengths.tolist()]).tolist()
     ends = np.cumsum([0, *counts.tolist()]).tolist()
-    return [_ring(loops[ends[i] : ends[i + 1]], tolerance / 2) for i in range(len(counts))]
+    pieces: list[list[Float[np.ndarray, "_ 2"]]] = []
+    owners: list[int] = []
+    for frame in range(len(counts)):
+        loops = [points[starts[i] : starts[i + 1]] for i in range(ends[frame], ends[frame + 1]) if lengths[i] >= 3]
+        found = _pieces(loops, tolerance / 2)
+        pieces += found
+        owners += [frame] * len(found)
+    return _sorted_regions(pieces, owners, len(counts), tolerance / 2)
 
 
-def _ring(loops: list[Float[np.ndarray, "k 2"]], tolerance: float) -> Float[np.ndarray, "k 2"]:
-    """The ring round what loops enclose, without points that make less than `tolerance` of difference."""
+def _pieces(loops: list[Float[np.ndarray, "_ 2"]], tolerance: float) -> list[list[Float[np.ndarray, "_ 2"]]]:
+    """What loops enclose, without points that make less than `tolerance` of difference: the rings of each piece, that
+    round it first."""
+    if not loops:
+        return []
     # Clipper's positive is clockwise as seen with y down, so all is turned round before and after.
-    turned = [loop[::-1] for loop in loops if len(loop) >= 3]
-    if not turned:
-        return np.zeros((0, 2))
-    found = [ring[::-1] for ring in CrossSection(turned, FillRule.Positive).simplify(tolerance).to_polygons()]
-    return joined([ring for ring in found if not _is_sliver(ring, tolerance)])
+    region = CrossSection([loop[::-1] for loop in loops], FillRule.Positive).simplify(tolerance)
+    if region.num_contour() <= 1:
+        return [[ring[::-1]] for ring in region.to_polygons()]
+    return [[ring[::-1] for ring in piece.to_polygons()] for piece in region.decompose()]
 
 
-def joined(rings: list[Float[np.ndarray, "k 2"]]) -> Float[np.ndarray, "m 2"]:
+def _sorted_regions(
+    pieces: list[list[Float[np.ndarray, "_ 2"]]], owners: list[int], n: int, tolerance: float
+) -> list[list[Float[np.ndarray, "_ 2"]]]:
+    """The rings of each of n frames, largest pieces first, from the pieces and the frame that each is in."""
+    areas, perimeters = _sizes([ring for piece in pieces for ring in piece])
+    # What rounding leaves between two curves that meet is thinner than the tolerance all along.
+    slivers = areas < 0.5 * tolerance * perimeters
+    regions: list[list[tuple[float, list[Float[np.ndarray, "_ 2"]]]]] = [[] for _ in range(n)]
+    at = 0
+    for frame, piece in zip(owners, pieces, strict=True):
+        if not slivers[at]:
+            kept = [i for i in range(1, len(piece)) if not slivers[at + i]]
+            kept.sort(key=lambda i, at=at: -areas[at + i])
+            regions[frame].append((areas[at], [piece[0], *(piece[i] for i in kept)]))
+        at += len(piece)
+    for region in regions:
+        region.sort(key=lambda piece: -piece[0])
+    return [[ring for _, piece in region for ring in piece] for region in regions]
+
+
+def _sizes(rings: list[Float[np.ndarray, "_ 2"]]) -> tuple[Float[np.ndarray, "r"], Float[np.ndarray, "r"]]:
+    """The area and the perimeter of each ring."""
+    if not rings:
+        return np.zeros(0), np.zeros(0)
+    lengths = np.array([len(ring) for ring in rings])
+    starts = np.cumsum(lengths) - lengths
+    points = np.concatenate(rings)
+    points -= np.repeat(points[starts], lengths, axis=0)
+    following = np.arange(1, len(points) + 1)
+    following[starts + lengths - 1] = starts
+    (x, y), (u, v) = points.T, points[following].T
+    return np.abs(np.add.reduceat(x * v - u * y, starts)) / 2, np.add.reduceat(np.hypot(u - x, v - y), starts)
+
+
+def joined(rings: list[Float[np.ndarray, "_ 2"]]) -> Float[np.ndarray, "m 2"]:
     """Rings as one, which goes from each to the nearest corner of the next and comes back the same way; (0, 2) for
     none."""
     if not rings:
         return np.zeros((0, 2))
+    if len(rings) == 1:
+        return rings[0]
     rings = sorted(rings, key=lambda ring: -_area(ring))
     whole, left = rings[0], rings[1:]
     while left:
@@ -97,12 +179,6 @@ def joined(rings: list[Float[np.ndarray, "k 2"]]) -> Float[np.ndarray, "m 2"]:
         ring = left.pop(nearest)
         whole = np.concatenate([whole[: i + 1], ring[j:], ring[: j + 1], whole[i:]])
     return whole
-
-
-def _is_sliver(ring: Float[np.ndarray, "k 2"], tolerance: float) -> bool:
-    """Whether a ring is thinner than the tolerance all along: what rounding leaves between two curves that meet."""
-    sides = np.roll(ring, -1, axis=0) - ring
-    return _area(ring) < 0.5 * tolerance * np.sqrt((sides**2).sum(axis=1)).sum()
 
 
 def _area(ring: Float[np.ndarray, "k 2"]) -> float:

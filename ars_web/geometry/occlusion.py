@@ -46,7 +46,7 @@ def visible_fractions(
     n, b = len(Ts_world_camera), len(boxes)
     visible = np.empty((n, b))
     Ts_world_box, sizes = stack(list(boxes))
-    rays, beyond = _rays(camera), _beyond_faces(Ts_world_box, sizes)
+    rays, beyond = rays_of_camera(camera), beyond_faces(Ts_world_box, sizes)
 
     def look(frames: slice) -> None:
         # Copies, so that the compiled loop never meets an array of another order or one that may only be read.
@@ -71,7 +71,7 @@ def visible_fractions(
 
 
 @lru_cache(maxsize=16)
-def _rays(camera: Camera) -> Float[np.ndarray, "2 h w"]:
+def rays_of_camera(camera: Camera) -> Float[np.ndarray, "2 h w"]:
     """Points of the normalised plane at every RAY_SPACING-th image coordinate, the image's far borders included."""
     u = np.arange(0, camera.width + RAY_SPACING, RAY_SPACING, dtype=np.float64)
     v = np.arange(0, camera.height + RAY_SPACING, RAY_SPACING, dtype=np.float64)
@@ -80,7 +80,7 @@ def _rays(camera: Camera) -> Float[np.ndarray, "2 h w"]:
     return np.ascontiguousarray(np.moveaxis(rays, -1, 0))
 
 
-def _beyond_faces(Ts_world_box: Float[np.ndarray, "b 4 4"], sizes: Float[np.ndarray, "b 3"]) -> Int[np.ndarray, "b b"]:
+def beyond_faces(Ts_world_box: Float[np.ndarray, "b 4 4"], sizes: Float[np.ndarray, "b 3"]) -> Int[np.ndarray, "b b"]:
     """For each box and each other one, beyond which of its six faces all of the other lies: bit 2 i for the face at
     the positive end of axis i, bit 2 i + 1 for that at the negative end."""
     axes, centres = Ts_world_box[:, :3, :3], Ts_world_box[:, :3, 3]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ars_web.errors import BadFile, BadInput
-from ars_web.recordings import ars, colmap, nerfstudio, poses, roars, tum
+from ars_web.recordings import ars, bop, colmap, nerfstudio, poses, roars, tum
 from ars_web.recordings.options import NOTHING_SAID, ReadOptions
 from ars_web.recordings.recording import Recording
 
@@ -38,6 +38,7 @@ READERS: dict[str, Reader] = {
     "tum": Reader("tum", tum.TITLE, tum.NEEDS, tum.recognises, tum.read),
     "colmap": Reader("colmap", colmap.TITLE, colmap.NEEDS, colmap.recognises, colmap.read),
     "nerfstudio": Reader("nerfstudio", nerfstudio.TITLE, nerfstudio.NEEDS, nerfstudio.recognises, nerfstudio.read),
+    "bop": Reader("bop", bop.TITLE, bop.NEEDS, bop.recognises, bop.read),
     "poses": Reader("poses", poses.TITLE, poses.NEEDS, poses.recognises, poses.read),
 }
 

@@ -132,6 +132,13 @@ class BoxNodes:
             known = None if stored is None else self._classes.get(stored.class_id)
             return (255, 255, 255) if known is None else rgb(known.color)
 
+    def mesh(self, box_id: int) -> str | None:
+        """The digest of the mesh that a box's object has, its own or its class's; None: it has none."""
+        with self.lock:
+            stored = self._boxes.get(box_id)
+            known = None if stored is None else self._classes.get(stored.class_id)
+            return None if stored is None else stored.mesh or (None if known is None else known.mesh)
+
     def has_client(self, client: viser.ClientHandle) -> bool:
         """Whether a browser is still connected; while viser tells of its end, it is not."""
         return client.client_id in self._server.get_clients()
@@ -175,8 +182,9 @@ class BoxNodes:
         nodes.edges.colors = np.array(color, dtype=np.uint8)
         nodes.body.scale = size
         nodes.body.color = color
-        # It would hide the hull inside: both are sorted by their middles, which are one, and both write their depth.
-        nodes.body.visible = stored.hull is None
+        # It would hide a hull or mesh inside: both are sorted by their middles, which are one, and both write their
+        # depth.
+        nodes.body.visible = stored.hull is None and self.mesh(box_id) is None
 
     def _make(self, box_id: int, color: tuple[int, int, int], size: tuple[float, float, float]) -> _Nodes:
         scene, at = self._server.scene, f"/boxes/{box_id}/at"

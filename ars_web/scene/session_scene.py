@@ -23,10 +23,10 @@ from ars_web.scene.cameras import add_cameras
 from ars_web.scene.extent import free_lens, recording_extent
 from ars_web.scene.ground import add_ground
 from ars_web.scene.hardening import Visitor
-from ars_web.scene.hulls import HullNodes
 from ars_web.scene.photos import Photos
 from ars_web.scene.picking import Ray, pixel_angle
 from ars_web.scene.placing import NOT_CONNECTED, Sight, placed, usual_size
+from ars_web.scene.surfaces import SurfaceNodes
 from ars_web.scene.views import ClientView, Page, Surroundings
 from ars_web.sessions.editing import SessionEditor
 from ars_web.sessions.model import VirtualBox
@@ -63,7 +63,8 @@ class SessionScene:
         self.server = hardening.guarded_server()
         extent = recording_extent(recording.frames.Ts_world_camera)
         boxes = BoxNodes(self.server)
-        self._hulls = HullNodes(self.server, boxes)
+        self._hulls = SurfaceNodes(self.server, boxes, kind="hull")
+        self._meshes = SurfaceNodes(self.server, boxes, kind="mesh")
         self._around = Surroundings(
             recording=recording,
             extent=extent,
@@ -140,6 +141,7 @@ class SessionScene:
             add_ground(server.scene, around.extent)
             add_cameras(server.scene, around.recording.frames, around.recording.cameras, around.extent)
         self._hulls.know(around.recording.hulls)
+        self._meshes.know(around.recording.meshes)
         around.boxes.show(around.recording.state)
         self._set_initial_camera()
         server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
@@ -270,6 +272,7 @@ class SessionScene:
                 loop = asyncio.get_running_loop()
                 now = await loop.run_in_executor(self._workers, self._store.snapshot, self._around.recording.id)
                 self._hulls.know(now.hulls)
+                self._meshes.know(now.meshes)
                 self._around.boxes.show(now.state)
                 self._revision = now.state.revision
         except ArsError as error:  # deleted, or the disk is full: those who ask for the session are told

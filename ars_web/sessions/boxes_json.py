@@ -1,6 +1,7 @@
 """Boxes and classes as the JSON of the API and of box files."""
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,6 +16,8 @@ from ars_web.sessions.drafting import BoxDraft
 from ars_web.sessions.hull_json import options_json
 from ars_web.sessions.model import WIDEST, ObjectClass, Orientation, Position, VirtualBox
 from ars_web.sessions.names import LONGEST_NAME
+from ars_web.sessions.object_mesh import SourcedMesh
+from ars_web.sessions.shape_json import keypoints_json, symmetry_json
 from ars_web.sessions.strict_json import first_fault, place_text, strict_json
 
 # Strict: a truth value or a string is no number. Whole numbers are. Beyond a million kilometres it is no place.
@@ -27,11 +30,13 @@ Id = Annotated[int, Field(strict=True, ge=0)]
 Name = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME)]
 
 
-class _Strict(BaseModel):
+class Strict(BaseModel):
+    """What people or programs wrote: unknown fields are refused."""
+
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class TransformJson(_Strict):
+class TransformJson(Strict):
     """A rigid transform: a position in metres and a quaternion, w first, of any length but zero."""
 
     position: tuple[Coordinate, Coordinate, Coordinate]
@@ -50,7 +55,7 @@ class TransformJson(_Strict):
         return rigid_transform.from_position_wxyz(np.array(self.position), np.array(self.wxyz))
 
 
-class BoxJson(_Strict):
+class BoxJson(Strict):
     """A box to be added."""
 
     class_id: Id
@@ -66,7 +71,7 @@ class BoxJson(_Strict):
         return BoxDraft(self.class_id, Box(self.T_world_box.matrix, np.array(self.size)), self.name, self.locked)
 
 
-class BoxPatchJson(_Strict):
+class BoxPatchJson(Strict):
     """What of a box is to change; what is not given stays."""
 
     class_id: Id | None = None
@@ -76,7 +81,7 @@ class BoxPatchJson(_Strict):
     locked: Flag | None = None
 
 
-class HullOptionsJson(_Strict):
+class HullOptionsJson(Strict):
     """How a box and its hull were made from masks."""
 
     orientation: Orientation = Field(description="world: axes as the world's; upright: turned about its z; free")
@@ -93,12 +98,13 @@ class HullOptionsJson(_Strict):
 
 
 class BoxFileItem(BoxJson):
-    """A box in a file: what `GET …/boxes` answers, of which `id`, `has_hull`, `hull_options` and `revision` are not
-    taken over: its hull and masks are not in the file."""
+    """A box in a file: what `GET …/boxes` answers, of which `id`, `has_hull`, `hull_options`, `has_mesh` and `revision`
+    are not taken over: its hull, mesh and masks are not in the file."""
 
     id: Id | None = None
     has_hull: bool | None = None
     hull_options: HullOptionsJson | None = None
+    has_mesh: bool | None = None
     revision: Id | None = None
 
 
@@ -123,19 +129,37 @@ def box_json(box: VirtualBox) -> dict[str, Any]:
         "size": box.box.size.tolist(),
         "has_hull": box.has_hull,
         "hull_options": None if box.hull_options is None else options_json(box.hull_options),
+        "has_mesh": box.has_mesh,
         "locked": box.locked,
         "revision": box.revision,
     }
 
 
-def class_json(a_class: ObjectClass) -> dict[str, Any]:
-    """The class as the API answers it."""
+def class_json(a_class: ObjectClass, meshes: Mapping[str, SourcedMesh]) -> dict[str, Any]:
+    """The class as the API answers it, with what there is to say of its mesh, if it is one of `meshes`, by digest; else
+    with the mesh's digest alone, as in edits."""
+    mesh = None if a_class.mesh is None else meshes.get(a_class.mesh)
     return {
         "id": a_class.id,
         "name": a_class.name,
         "color": a_class.color,
         "default_size": None if a_class.default_size is None else list(a_class.default_size),
+        "symmetry": {"rotations": [], "axis": None, "flip": False, **symmetry_json(a_class.symmetry)},
+        "keypoints": keypoints_json(a_class.keypoints),
+        "mesh": mesh_json(mesh) if mesh is not None else a_class.mesh and {"digest": a_class.mesh},
         "revision": a_class.revision,
+    }
+
+
+def mesh_json(sourced: SourcedMesh) -> dict[str, Any]:
+    """What there is to say of a mesh."""
+    mesh, source = sourced.mesh, sourced.source
+    return {
+        "digest": mesh.digest,
+        "vertices": len(mesh.vertices),
+        "faces": len(mesh.faces),
+        "extent": mesh.extent.tolist(),
+        "source": {"name": source.name, "unit": source.unit, "axes": source.axes, "origin": source.origin},
     }
 
 

@@ -10,8 +10,8 @@ from sqlalchemy.sql.sqltypes import Boolean, Float, LargeBinary
 
 from ars_web.errors import ArsError
 from ars_web.geometry.rigid_transform import ROTATION_TOLERANCE
-from ars_web.sessions import hull_rows, rows, tables
-from ars_web.sessions.edits import BoxChange, Edit, differences, replay
+from ars_web.sessions import hull_rows, mesh_rows, rows, tables
+from ars_web.sessions.edits import BoxChange, ClassChange, Edit, differences, replay
 from ars_web.sessions.model import SessionState
 from ars_web.sessions.names import checked_image_name
 from ars_web.sessions.outlines import checked_polygons
@@ -97,6 +97,9 @@ def check_log(connection: Connection) -> list[str]:
         return [*problems, f"the log cannot be replayed: {error}"]
     missing = sorted(_hulls_named(origin, edits) - {hull.digest for hull in hull_rows.all_hulls(connection)})
     problems += [f"a box of the log has hull {digest}, which is not there" for digest in missing[:5]]
+    meshes = {sourced.mesh.digest for sourced in mesh_rows.all_meshes(connection)}
+    missing = sorted(_meshes_named(origin, edits) - meshes)
+    problems += [f"a class or a box of the log has mesh {digest}, which is not there" for digest in missing[:5]]
     return problems + [f"the log and the tables differ in {what}" for what in unlike[:5]]
 
 
@@ -104,6 +107,12 @@ def _hulls_named(origin: SessionState, edits: list[Edit]) -> set[str]:
     changes = (change for edit in edits for change in edit.changes if isinstance(change, BoxChange))
     boxes = (*origin.boxes.values(), *(box for change in changes for box in (change.before, change.after)))
     return {box.hull for box in boxes if box is not None and box.hull is not None}
+
+
+def _meshes_named(origin: SessionState, edits: list[Edit]) -> set[str]:
+    changes = (change for edit in edits for change in edit.changes if isinstance(change, BoxChange | ClassChange))
+    changed = (thing for change in changes for thing in (change.before, change.after))
+    return {*origin.meshes_named, *(thing.mesh for thing in changed if thing is not None and thing.mesh is not None)}
 
 
 def check_masks(connection: Connection) -> list[str]:

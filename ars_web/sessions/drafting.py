@@ -9,7 +9,9 @@ import numpy as np
 
 from ars_web.errors import BadInput, Conflict, Locked, NotFound
 from ars_web.geometry.box import Box
+from ars_web.geometry.keypoints import Keypoint, checked_keypoints
 from ars_web.geometry.rigid_transform import Transform
+from ars_web.geometry.symmetry import Symmetry
 from ars_web.sessions.edits import same_content
 from ars_web.sessions.model import ObjectClass, SessionState, VirtualBox
 from ars_web.sessions.names import FreshNames, checked_name
@@ -39,7 +41,7 @@ class BoxDraft:
     """A box that is to be added; without a name it is called after its class.
 
     Attributes:
-        hull: the digest of one that the session has.
+        hull, mesh: the digests of ones that the session has.
     """
 
     class_id: int
@@ -47,6 +49,7 @@ class BoxDraft:
     name: str | None = None
     locked: bool = False
     hull: str | None = None
+    mesh: str | None = None
 
 
 def drafted_box(state: SessionState, draft: BoxDraft) -> VirtualBox:
@@ -75,7 +78,14 @@ def _drafted(state: SessionState, draft: BoxDraft, box_id: int, names: FreshName
     name = names.give(a_class.name) if draft.name is None else checked_name(draft.name, what="a box")
     names.take(name)
     return VirtualBox(
-        box_id, a_class.id, name, draft.box, revision=state.revision + 1, locked=draft.locked, hull=draft.hull
+        box_id,
+        a_class.id,
+        name,
+        draft.box,
+        revision=state.revision + 1,
+        locked=draft.locked,
+        hull=draft.hull,
+        mesh=draft.mesh,
     )
 
 
@@ -88,8 +98,11 @@ def changed_box(
     size: np.ndarray | None,
     name: str | None,
     locked: bool | None,
+    mesh: str | Literal[Unset.UNSET] | None = UNSET,
 ) -> VirtualBox:
     """`before` with what is given in place, of the next revision; `before` itself where nothing differs.
+
+    `mesh` is the digest of a stored one, or None for none.
 
     Raises:
         BadInput: a value cannot be a box's.
@@ -109,15 +122,18 @@ def changed_box(
         box=Box(asked.T_world_box if moved else box.T_world_box, asked.size if resized else box.size),
         revision=state.revision + 1,
         locked=before.locked if locked is None else locked,
+        mesh=before.mesh if mesh is UNSET else mesh,
     )
     if after.locked:
-        changes = {"class": after.class_id != before.class_id, "place": moved, "size": resized}
+        reclassed, reshaped = after.class_id != before.class_id, after.mesh != before.mesh
+        changes = {"class": reclassed, "place": moved, "size": resized, "mesh": reshaped}
         refuse_locked(before, *(what for what, is_so in changes.items() if is_so))
     return before if same_content(before, after) else after
 
 
 def refuse_locked(box: VirtualBox, *changes: str) -> None:
-    """Refuse what a lock keeps from being changed: `class`, `place`, `size`, `masks`, or `existence` for deletion.
+    """Refuse what a lock keeps from being changed: `class`, `place`, `size`, `mesh`, `masks`, or `existence` for
+    deletion.
 
     Raises:
         Locked: the box is locked and there are changes.
@@ -135,8 +151,13 @@ def changed_class(
     name: str | None,
     color: str | None,
     default_size: ClassSize | Literal[Unset.UNSET] | None,
+    symmetry: Symmetry | Literal[Unset.UNSET] = UNSET,
+    keypoints: Sequence[Keypoint] | Literal[Unset.UNSET] = UNSET,
+    mesh: str | Literal[Unset.UNSET] | None = UNSET,
 ) -> ObjectClass:
     """`before` with what is given in place, of the next revision; `before` itself where nothing differs.
+
+    `mesh` is the digest of a stored one, or None for none.
 
     Raises:
         BadInput: a value cannot be a class's.
@@ -146,6 +167,9 @@ def changed_class(
         name=before.name if name is None else free_class_name(state, name, own_id=before.id),
         color=before.color if color is None else checked_color(color),
         default_size=before.default_size if default_size is UNSET else class_size(default_size),
+        symmetry=before.symmetry if symmetry is UNSET else symmetry,
+        keypoints=before.keypoints if keypoints is UNSET else checked_keypoints(keypoints),
+        mesh=before.mesh if mesh is UNSET else mesh,
         revision=state.revision + 1,
     )
     return before if same_content(before, after) else after
@@ -165,6 +189,8 @@ def change_summary(before: VirtualBox, after: VirtualBox) -> str:
         "Reclassify": before.class_id != after.class_id,
         "Lock": after.locked and not before.locked,
         "Unlock": before.locked and not after.locked,
+        "Give a mesh to": after.mesh is not None and before.mesh != after.mesh,
+        "Take the mesh from": before.mesh is not None and after.mesh is None,
     }
     verbs = [verb for verb, is_so in said.items() if is_so]
     return f"{verbs[0] if len(verbs) == 1 else 'Change'} {before.name}"
@@ -172,7 +198,20 @@ def change_summary(before: VirtualBox, after: VirtualBox) -> str:
 
 def class_change_summary(before: ObjectClass, after: ObjectClass) -> str:
     """One line for the history."""
-    if (before.name, before.color) != (after.name, after.color):
+    differing = {
+        "appearance": (before.name, before.color) != (after.name, after.color),
+        "mesh": before.mesh != after.mesh,
+        "symmetry": before.symmetry != after.symmetry,
+        "keypoints": before.keypoints != after.keypoints,
+        # Set along with a mesh, it goes without saying.
+        "size": before.default_size != after.default_size and before.mesh == after.mesh,
+    }
+    changed = [what for what, is_so in differing.items() if is_so]
+    if changed == ["mesh"]:
+        return f"{'Take the mesh from' if after.mesh is None else 'Give a mesh to'} class {before.name}"
+    if changed in (["symmetry"], ["keypoints"]):
+        return f"Set {changed[0]} of {before.name}"
+    if changed != ["size"]:
         return f"Change class {before.name}"
     if after.default_size is None:
         return f"Clear size of {before.name}"

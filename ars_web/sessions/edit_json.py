@@ -16,6 +16,7 @@ from ars_web.sessions.model import Mask, ObjectClass, SessionState, VirtualBox, 
 from ars_web.sessions.names import checked_name
 from ars_web.sessions.outlines import polygons_from_json, polygons_json
 from ars_web.sessions.palette import checked_color
+from ars_web.sessions.shape_json import keypoints_from_json, keypoints_json, symmetry_from_json, symmetry_json
 from ars_web.sessions.sizes import checked_class_size
 
 Json = dict[str, Any]
@@ -158,6 +159,9 @@ def _class_json(a_class: ObjectClass) -> Json:
         "color": a_class.color,
         "revision": a_class.revision,
         "default_size": a_class.default_size,
+        "mesh": a_class.mesh,
+        "symmetry": symmetry_json(a_class.symmetry),
+        "keypoints": keypoints_json(a_class.keypoints),
     }
 
 
@@ -167,8 +171,11 @@ def _class(item: Json) -> ObjectClass:
         name=checked_name(item["name"], what="a class"),
         color=checked_color(item["color"]),
         revision=_whole(item, "revision"),
-        # Logs from before there were such sizes do not say.
+        # Logs from before there were such sizes, or shapes, do not say.
         default_size=None if item.get("default_size") is None else checked_class_size(item["default_size"]),
+        mesh=None if item.get("mesh") is None else digest_from_json(item["mesh"], what="a mesh"),
+        symmetry=symmetry_from_json(item.get("symmetry")),
+        keypoints=keypoints_from_json(item.get("keypoints")),
     )
 
 
@@ -185,6 +192,7 @@ def _box_json(box: VirtualBox) -> Json:
         "locked": box.locked,
         "hull": box.hull,
         "hull_options": None if box.hull_options is None else options_json(box.hull_options),
+        "mesh": box.mesh,
     }
 
 
@@ -198,10 +206,11 @@ def _box(item: Json) -> VirtualBox:
         name=checked_name(item["name"], what="a box"),
         box=Box(T, np.array(item["size"], dtype=np.float64)),
         revision=_whole(item, "revision"),
-        # Logs from before there were locks, or hulls, do not say.
+        # Logs from before there were locks, hulls or meshes do not say.
         locked=bool(item.get("locked", False)),
         hull=None if item.get("hull") is None else digest_from_json(item["hull"]),
         hull_options=None if item.get("hull_options") is None else options_from_json(item["hull_options"]),
+        mesh=None if item.get("mesh") is None else digest_from_json(item["mesh"], what="a mesh"),
     )
 
 

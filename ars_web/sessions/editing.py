@@ -10,7 +10,9 @@ import numpy as np
 
 from ars_web.errors import BadInput, Conflict
 from ars_web.geometry.box import Box, beside, resting_on_ground
+from ars_web.geometry.keypoints import Keypoint
 from ars_web.geometry.rigid_transform import Transform
+from ars_web.geometry.symmetry import Symmetry
 from ars_web.sessions.drafting import (
     UNSET,
     BoxDraft,
@@ -32,11 +34,14 @@ from ars_web.sessions.drafting import (
 from ars_web.sessions.edit_json import request_digest
 from ars_web.sessions.edits import BoxChange, Change, ClassChange, Edit, MaskChange, NameChange, inverse, restated
 from ars_web.sessions.history import LogEntry, to_redo, to_undo
+from ars_web.sessions.label_editing import LabelEditing
 from ars_web.sessions.model import ObjectClass, SessionState, SessionSummary, VirtualBox
 from ars_web.sessions.names import FreshNames, checked_name
 from ars_web.sessions.object_drafting import MaskDraft, reclassed
-from ars_web.sessions.object_editing import ObjectEditing, first_box
+from ars_web.sessions.object_editing import first_box
+from ars_web.sessions.object_mesh import SourcedMesh
 from ars_web.sessions.palette import checked_color, next_color
+from ars_web.sessions.sizes import checked_class_size
 from ars_web.sessions.transaction import SessionTransaction
 
 __all__ = ["UNSET", "BoxDraft", "MaskDraft", "NothingToUndo", "SessionEditor"]
@@ -46,15 +51,15 @@ class NothingToUndo(BadInput):
     """The author has no edit to take back, or none to make again."""
 
 
-class SessionEditor(ObjectEditing):
+class SessionEditor(LabelEditing):
     """Changes sessions, for any number of threads; other processes may change the same sessions meanwhile.
 
     Every method raises NotFound for an unknown session and StoreError where the edit cannot be kept. Methods with
     `expected_revision` raise Conflict where the thing is no longer at that revision; `current` is what it is now.
 
-    A locked box keeps its class, place, size, hull and masks, and is not deleted: Locked says so. It may be renamed
-    and unlocked, also together with other changes, which then count. Undo and redo bring back what was, locks
-    included; a box that someone else locked since is a Conflict for them, as after any other change.
+    A locked box keeps its class, place, size, hull, mesh and masks, and is not deleted: Locked says so. It may be
+    renamed and unlocked, also together with other changes, which then count. Undo and redo bring back what was,
+    locks included; a box that someone else locked since is a Conflict for them, as after any other change.
     """
 
     def add_box(
@@ -87,8 +92,8 @@ class SessionEditor(ObjectEditing):
     def duplicate_box(self, sid: str, box_id: int, *, author: str, key: str | None = None) -> VirtualBox:
         """A new box like another, beside it along its own x (see `geometry.box.beside`), called `cube 2` after `cube`.
 
-        It has the other one's hull, no masks, and is not locked, also where the other one is. A repeat with the same
-        idempotency `key` returns what the first returned, and adds nothing.
+        It has the other one's hull and mesh, no masks, and is not locked, also where the other one is. A repeat with
+        the same idempotency `key` returns what the first returned, and adds nothing.
         """
         with self._editing(sid) as session:
             digest = request_digest("duplicate box", author, box_id)
@@ -97,7 +102,7 @@ class SessionEditor(ObjectEditing):
                 return first_box(before)
             original = existing_box(session.state, box_id)
             name = FreshNames(box.name for box in session.state.boxes.values()).give_copy(original.name)
-            draft = BoxDraft(original.class_id, beside(original.box), name, hull=original.hull)
+            draft = BoxDraft(original.class_id, beside(original.box), name, hull=original.hull, mesh=original.mesh)
             changes, summary = _additions([drafted_box(session.state, draft)]), f"Duplicate {original.name}"
             edit = self._append(session, changes, author=author, summary=summary, key=key, digest=digest)
         return first_box(edit)
@@ -127,16 +132,25 @@ class SessionEditor(ObjectEditing):
         size: np.ndarray | None = None,
         name: str | None = None,
         locked: bool | None = None,
+        mesh: SourcedMesh | Literal[Unset.UNSET] | None = UNSET,
         author: str,
     ) -> VirtualBox:
-        """Change what is given of a box and leave the rest. Nothing new given: the box as it is.
+        """Change what is given of a box and leave the rest; `mesh` None: it has none of its own any more. Nothing new
+        given: the box as it is.
 
-        Its hull moves, turns and scales with it; its masks are of its class.
+        Its hull moves, turns and scales with it, its mesh moves and turns; its masks are of its class.
         """
         with self._editing(sid) as session:
             before = box_at(session.state, box_id, expected_revision)
             after = changed_box(
-                session.state, before, class_id=class_id, T_world_box=T_world_box, size=size, name=name, locked=locked
+                session.state,
+                before,
+                class_id=class_id,
+                T_world_box=T_world_box,
+                size=size,
+                name=name,
+                locked=locked,
+                mesh=_kept(session, mesh),
             )
             if after is before:
                 return before
@@ -218,15 +232,35 @@ class SessionEditor(ObjectEditing):
         name: str | None = None,
         color: str | None = None,
         default_size: ClassSize | Literal[Unset.UNSET] | None = UNSET,
+        symmetry: Symmetry | Literal[Unset.UNSET] = UNSET,
+        keypoints: Sequence[Keypoint] | Literal[Unset.UNSET] = UNSET,
+        mesh: SourcedMesh | Literal[Unset.UNSET] | None = UNSET,
+        fit_size: bool | None = False,
         author: str,
     ) -> ObjectClass:
-        """Change what is given of a class and leave the rest; `default_size` None: it has none any more.
+        """Change what is given of a class and leave the rest; `default_size` and `mesh` None: it has none any more,
+        `keypoints` empty: the box's centre and corners.
 
-        Nothing new given: the class as it is.
+        `fit_size`: the usual size becomes the extent of the mesh that is given; None: where there is no usual size,
+        and the mesh is not flat. Nothing new given: the class as it is.
+
+        Raises:
+            BadInput: a value cannot be a class's; `fit_size` without a mesh, or with a flat one, which fits no box.
         """
         with self._editing(sid) as session:
             before = class_at(session.state, class_id, expected_revision)
-            after = changed_class(session.state, before, name=name, color=color, default_size=default_size)
+            if fit_size or (fit_size is None and before.default_size is None and default_size is UNSET):
+                default_size = _fitting(mesh, default_size, needed=bool(fit_size))
+            after = changed_class(
+                session.state,
+                before,
+                name=name,
+                color=color,
+                default_size=default_size,
+                symmetry=symmetry,
+                keypoints=keypoints,
+                mesh=_kept(session, mesh),
+            )
             if after is before:
                 return before
             change = ClassChange(class_id, before, after)
@@ -332,6 +366,32 @@ class SessionEditor(ObjectEditing):
             undoes=edit.revision if verb == "Undo" else None,
             redoes=edit.revision if verb == "Redo" else None,
         )
+
+
+def _kept(
+    session: SessionTransaction, mesh: SourcedMesh | Literal[Unset.UNSET] | None
+) -> str | Literal[Unset.UNSET] | None:
+    """The digest of `mesh`, which is stored; it is taken back with the edit where that fails."""
+    return session.keep_mesh(mesh) if isinstance(mesh, SourcedMesh) else mesh
+
+
+def _fitting(
+    mesh: SourcedMesh | Literal[Unset.UNSET] | None,
+    size: ClassSize | Literal[Unset.UNSET] | None,
+    *,
+    needed: bool,
+) -> ClassSize | Literal[Unset.UNSET] | None:
+    """The size of a box that fits `mesh`; where there is none, and it is not `needed`, `size`."""
+    if not isinstance(mesh, SourcedMesh):
+        if needed:
+            raise BadInput("there is no mesh that the class's usual size could be fitted to; give one with it")
+        return size
+    extent = mesh.mesh.extent
+    if extent.min() > 0.0:
+        return checked_class_size(extent.tolist())
+    if needed:
+        raise BadInput(f"the mesh is flat ({extent.tolist()} m): no box fits it; give the class a size yourself")
+    return size
 
 
 def _additions(boxes: Sequence[VirtualBox]) -> tuple[BoxChange, ...]:

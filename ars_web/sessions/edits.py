@@ -98,11 +98,11 @@ T = TypeVar("T", VirtualBox, ObjectClass, Mask)
 def same_content(a: Thing | None, b: Thing | None) -> bool:
     """Whether two boxes, classes or masks are alike in everything but the revision that made them so."""
     if isinstance(a, ObjectClass) and isinstance(b, ObjectClass):
-        return (a.id, a.name, a.color, a.default_size) == (b.id, b.name, b.color, b.default_size)
+        return replace(a, revision=b.revision) == b
     if isinstance(a, VirtualBox) and isinstance(b, VirtualBox):
         return (
-            (a.id, a.class_id, a.name, a.locked, a.hull, a.hull_options)
-            == (b.id, b.class_id, b.name, b.locked, b.hull, b.hull_options)
+            (a.id, a.class_id, a.name, a.locked, a.hull, a.hull_options, a.mesh)
+            == (b.id, b.class_id, b.name, b.locked, b.hull, b.hull_options, b.mesh)
             and np.array_equal(a.box.T_world_box, b.box.T_world_box)
             and np.array_equal(a.box.size, b.box.size)
         )

@@ -34,12 +34,12 @@ def options_from_json(item: Any) -> HullOptions:
     return HullOptions(values["orientation"], values["position"], values["widen_px"], values["ground"], fitted)
 
 
-def digest_from_json(text: Any) -> str:
-    """A hull's name.
+def digest_from_json(text: Any, *, what: str = "a hull") -> str:
+    """The name of a hull, or of what else is named by what it holds.
 
     Raises:
         BadInput: it is not 64 hexadecimal digits.
     """
     if not isinstance(text, str) or not _DIGEST.fullmatch(text):
-        raise BadInput(f"a hull is named by 64 hexadecimal digits, not {text!r}")
+        raise BadInput(f"{what} is named by 64 hexadecimal digits, not {text!r}")
     return text

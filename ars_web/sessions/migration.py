@@ -14,7 +14,7 @@ from sqlalchemy.pool import ConnectionPoolEntry, NullPool
 from ars_web.errors import StoreError
 from ars_web.sessions.sqlite import database_url, explained
 
-SCHEMA = "0004"
+SCHEMA = "0005"
 """The newest step under `migrations/versions`. A constant, so that opening a session does not load Alembic."""
 
 SCRIPTS = Path(__file__).parent / "migrations"

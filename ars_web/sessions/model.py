@@ -12,9 +12,12 @@ from jaxtyping import Float
 from ars_web.errors import BadInput
 from ars_web.geometry.box import FARTHEST, Box
 from ars_web.geometry.camera import Camera
+from ars_web.geometry.keypoints import DEFAULT_KEYPOINTS, Keypoint
 from ars_web.geometry.polygon import Polygon
+from ars_web.geometry.symmetry import NO_SYMMETRY, Symmetry
 from ars_web.recordings.recording import StoredImage
 from ars_web.sessions.hull_mesh import HullMesh
+from ars_web.sessions.object_mesh import ObjectMesh
 
 Orientation = Literal["world", "upright", "free"]
 Position = Literal["box", "mass"]
@@ -50,6 +53,9 @@ class ObjectClass:
         color: `#rrggbb`, lower case.
         revision: the session's revision that last changed it; its ETag.
         default_size: metres, of a new box of this class along its own axes; None: nobody has said.
+        mesh: the digest of the stored mesh of its objects; None: it has none.
+        symmetry: of its objects, in their boxes' frames.
+        keypoints: the named points of its objects; none: the box's centre and corners (`DEFAULT_KEYPOINTS`).
     """
 
     id: int
@@ -57,6 +63,9 @@ class ObjectClass:
     color: str
     revision: int
     default_size: tuple[float, float, float] | None = None
+    mesh: str | None = None
+    symmetry: Symmetry = NO_SYMMETRY
+    keypoints: tuple[Keypoint, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -126,9 +135,10 @@ class VirtualBox:
         name: shown to people; not empty, need not be unique.
         box: its place and size.
         revision: the session's revision that last changed it; its ETag.
-        locked: its class, place, size, hull and masks are not changed, nor is it deleted, until it is unlocked.
+        locked: its class, place, size, hull, mesh and masks are not changed, nor is it deleted, until it is unlocked.
         hull: the digest of the hull that is stored with it, in units of its sizes; None: it has none.
         hull_options: how box and hull were made from the masks; None: they were not.
+        mesh: the digest of the object's own stored mesh, which counts before that of its class; None: it has none.
     """
 
     id: int
@@ -139,11 +149,17 @@ class VirtualBox:
     locked: bool = False
     hull: str | None = None
     hull_options: HullOptions | None = None
+    mesh: str | None = None
 
     @property
     def has_hull(self) -> bool:
         """Whether a visual hull is stored with it."""
         return self.hull is not None
+
+    @property
+    def has_mesh(self) -> bool:
+        """Whether a mesh of its own, not its class's, is stored with it."""
+        return self.mesh is not None
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,6 +231,20 @@ class SessionState:
         found = (mask for mask in self.masks.values() if mask.box_id == box_id)
         return tuple(sorted(found, key=lambda mask: mask.frame))
 
+    def mesh_of(self, box: VirtualBox) -> str | None:
+        """The digest of the mesh that a box's object has: the box's own, else its class's; None: neither has one."""
+        return box.mesh or self.classes[box.class_id].mesh
+
+    def keypoints_of(self, class_id: int) -> tuple[Keypoint, ...]:
+        """The named points of a class's objects: its own, else the centre and the corners of their boxes."""
+        return self.classes[class_id].keypoints or DEFAULT_KEYPOINTS
+
+    @property
+    def meshes_named(self) -> frozenset[str]:
+        """The digests of the meshes that classes and boxes have."""
+        named = {thing.mesh for thing in (*self.classes.values(), *self.boxes.values())}
+        return frozenset(digest for digest in named if digest is not None)
+
 
 @dataclass(frozen=True, eq=False)
 class SessionSnapshot:
@@ -222,6 +252,7 @@ class SessionSnapshot:
 
     Attributes:
         hulls: those of its boxes, by digest.
+        meshes: those of its classes and boxes, by digest.
     """
 
     id: str
@@ -229,3 +260,4 @@ class SessionSnapshot:
     cameras: dict[int, Camera]
     frames: FrameTable
     hulls: Mapping[str, HullMesh] = field(default_factory=dict[str, HullMesh])
+    meshes: Mapping[str, ObjectMesh] = field(default_factory=dict[str, ObjectMesh])

@@ -143,6 +143,7 @@ def object_changes(state: SessionState, draft: ObjectDraft) -> tuple[BoxChange, 
         revision=state.revision + 1,
         hull=draft.hull,
         hull_options=draft.hull_options,
+        mesh=None if before is None else before.mesh,
     )
     return BoxChange(object_id, before, after), _masks_of_object(state, draft, object_id, class_id)
 

@@ -30,6 +30,7 @@ from ars_web.sessions.edit_json import (
 from ars_web.sessions.edits import BoxChange, ClassChange, Edit, MaskChange
 from ars_web.sessions.history import LogEntry
 from ars_web.sessions.model import FrameTable, ObjectClass, SessionState, SessionSummary, VirtualBox
+from ars_web.sessions.shape_json import keypoints_from_text, keypoints_text, symmetry_from_text, symmetry_text
 
 IMAGES = "images"
 """The folder, in a session's own, of images that were copied in."""
@@ -328,13 +329,14 @@ def _edit(row: Row[Any]) -> Edit:
 
 def _class(row: Row[Any]) -> ObjectClass:
     size = None if row.default_size is None else default_size_from_json(row.default_size)
-    return ObjectClass(row.id, row.name, row.color, row.revision, size)
+    symmetry, keypoints = symmetry_from_text(row.symmetry), keypoints_from_text(row.keypoints)
+    return ObjectClass(row.id, row.name, row.color, row.revision, size, row.mesh, symmetry, keypoints)
 
 
 def _box(row: Row[Any]) -> VirtualBox:
     box = Box(_transforms(row.pose, count=1)[0], np.array([row.size_x, row.size_y, row.size_z]))
     options = hull_rows.options_from_text(row.hull_options)
-    return VirtualBox(row.id, row.class_id, row.name, box, row.revision, row.locked, row.hull, options)
+    return VirtualBox(row.id, row.class_id, row.name, box, row.revision, row.locked, row.hull, options, row.mesh)
 
 
 def _box_row(box: VirtualBox) -> dict[str, Any]:
@@ -351,6 +353,7 @@ def _box_row(box: VirtualBox) -> dict[str, Any]:
         "locked": box.locked,
         "hull": box.hull,
         "hull_options": hull_rows.options_text(box.hull_options),
+        "mesh": box.mesh,
     }
 
 
@@ -362,6 +365,9 @@ def _class_row(a_class: ObjectClass) -> dict[str, Any]:
         "color": a_class.color,
         "revision": a_class.revision,
         "default_size": None if size is None else orjson.dumps(size).decode(),
+        "mesh": a_class.mesh,
+        "symmetry": symmetry_text(a_class.symmetry),
+        "keypoints": keypoints_text(a_class.keypoints),
     }
 
 

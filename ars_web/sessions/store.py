@@ -15,7 +15,7 @@ from sqlalchemy import Connection
 from ars_web.errors import ArsError, BadInput, Conflict, NotFound, StoreError
 from ars_web.geometry.camera import Camera
 from ars_web.recordings.recording import Recording, SkippedFrame
-from ars_web.sessions import hull_rows, rows, session_folders
+from ars_web.sessions import hull_rows, mesh_rows, rows, session_folders
 from ars_web.sessions.checking import check_session
 from ars_web.sessions.database import Database
 from ars_web.sessions.edits import Edit, apply
@@ -25,6 +25,7 @@ from ars_web.sessions.importing import fill, starting_state
 from ars_web.sessions.migration import back_up
 from ars_web.sessions.model import FrameTable, SessionSnapshot, SessionState, SessionSummary
 from ars_web.sessions.names import checked_key
+from ars_web.sessions.object_mesh import SourcedMesh
 from ars_web.sessions.sqlite import explained
 from ars_web.sessions.transaction import SessionTransaction
 
@@ -47,6 +48,8 @@ class _Open:
     cameras: dict[int, Camera] | None = field(default=None)
     # By digest, of the boxes of a recent state. What a digest names never changes.
     hulls: dict[str, HullMesh] = field(default_factory=dict[str, HullMesh])
+    # The same of its classes' and boxes' meshes.
+    meshes: dict[str, SourcedMesh] = field(default_factory=dict[str, SourcedMesh])
 
 
 class SessionStore:
@@ -216,6 +219,7 @@ class SessionStore:
                 cameras=dict(_cameras(connection, session)),
                 frames=self._frames(sid, connection, session),
                 hulls=_hulls(connection, session, state),
+                meshes={digest: known.mesh for digest, known in _meshes(connection, session, state).items()},
             )
 
     def hull(self, sid: str, digest: str) -> HullMesh:
@@ -227,6 +231,21 @@ class SessionStore:
         with self._reading(sid) as (connection, session):
             known = session.hulls.get(digest)
             return hull_rows.load_hull(connection, digest) if known is None else known
+
+    def mesh(self, sid: str, digest: str) -> SourcedMesh:
+        """A mesh that a class or a box of the session has, or had, and where it came from.
+
+        Raises:
+            NotFound: the session has no such mesh.
+        """
+        with self._reading(sid) as (connection, session):
+            known = session.meshes.get(digest)
+            return mesh_rows.load_mesh(connection, digest) if known is None else known
+
+    def meshes(self, sid: str) -> dict[str, SourcedMesh]:
+        """The meshes that the session's classes and boxes have, by digest, and where they came from."""
+        with self._reading(sid) as (connection, session):
+            return _meshes(connection, session, _current_state(connection, session))
 
     def delete(self, sid: str, *, expected_revision: int | None = None) -> None:
         """Move the session to the trash, once the edits that are being written are done.
@@ -340,6 +359,15 @@ def _hulls(connection: Connection, session: _Open, state: SessionState) -> dict[
     if wanted != known.keys():
         kept = {digest: known[digest] for digest in wanted & known.keys()}
         known = session.hulls = {**kept, **hull_rows.load_hulls(connection, wanted - kept.keys())}
+    return dict(known)
+
+
+def _meshes(connection: Connection, session: _Open, state: SessionState) -> dict[str, SourcedMesh]:
+    """Those of the state's classes and boxes: the ones at hand, and the others read."""
+    known, wanted = session.meshes, state.meshes_named
+    if wanted != known.keys():
+        kept = {digest: known[digest] for digest in wanted & known.keys()}
+        known = session.meshes = {**kept, **mesh_rows.load_meshes(connection, wanted - kept.keys())}
     return dict(known)
 
 

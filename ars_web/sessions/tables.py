@@ -83,6 +83,11 @@ object_class = Table(
     Column("revision", Integer, nullable=False),
     # Three lengths as a JSON list; NULL: nobody has said.
     Column("default_size", Text),
+    Column("mesh", Text, ForeignKey("mesh.digest", name="class_mesh")),
+    # As a JSON object; NULL: none.
+    Column("symmetry", Text),
+    # A JSON list; NULL: the box's centre and corners.
+    Column("keypoints", Text),
 )
 
 box = Table(
@@ -101,6 +106,7 @@ box = Table(
     Column("hull", Text, ForeignKey("hull.digest", name="box_hull")),
     # As a JSON object; NULL: it was not made from masks.
     Column("hull_options", Text),
+    Column("mesh", Text, ForeignKey("mesh.digest", name="box_mesh")),
 )
 
 hull = Table(
@@ -112,6 +118,22 @@ hull = Table(
     Column("vertices", LargeBinary, nullable=False),
     # Three little-endian int32 a face.
     Column("faces", LargeBinary, nullable=False),
+)
+
+mesh = Table(
+    "mesh",
+    metadata,
+    # As `hull.digest`.
+    Column("digest", Text, primary_key=True),
+    # Three little-endian float32 a vertex, metres along the box's axes from its centre.
+    Column("vertices", LargeBinary, nullable=False),
+    # Three little-endian int32 a face.
+    Column("faces", LargeBinary, nullable=False),
+    # Where it came from: the file's name, and how its numbers were read.
+    Column("source", Text, nullable=False),
+    Column("unit", Text, nullable=False),
+    Column("axes", Text, nullable=False),
+    Column("origin", Text, nullable=False),
 )
 
 mask = Table(

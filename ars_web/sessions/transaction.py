@@ -5,11 +5,12 @@ from collections.abc import Iterator
 from sqlalchemy import Connection
 
 from ars_web.errors import BadInput
-from ars_web.sessions import hull_rows, rows
+from ars_web.sessions import hull_rows, mesh_rows, rows
 from ars_web.sessions.edits import Edit, apply
 from ars_web.sessions.history import LogEntry
 from ars_web.sessions.hull_mesh import HullMesh
 from ars_web.sessions.model import SessionState, SessionSummary
+from ars_web.sessions.object_mesh import SourcedMesh
 from ars_web.sessions.rows import Request
 
 
@@ -40,6 +41,10 @@ class SessionTransaction:
     def keep_hull(self, hull: HullMesh) -> str:
         """Have `hull` stored, so that boxes can name it; its digest."""
         return hull_rows.keep_hull(self._connection, hull)
+
+    def keep_mesh(self, mesh: SourcedMesh) -> str:
+        """Have `mesh` stored, so that classes and boxes can name it; its digest."""
+        return mesh_rows.keep_mesh(self._connection, mesh)
 
     def answered(self, key: str, *, digest: str) -> Edit | None:
         """The edit that was the answer to an earlier request with this idempotency key; None for a new key.

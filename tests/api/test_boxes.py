@@ -24,6 +24,7 @@ def test_a_box_is_made_changed_and_deleted(client: httpx.Client, path: str, box_
         "name": "left",
         "has_hull": False,
         "hull_options": None,
+        "has_mesh": False,
         "locked": False,
         "revision": 1,
     }

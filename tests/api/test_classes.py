@@ -12,7 +12,16 @@ def test_a_class_is_made_changed_and_deleted(client: httpx.Client, sid: str) -> 
 
     made = client.post(path, json={"name": "ball", "color": "#AABBCC"})
     assert (made.status_code, made.headers["etag"]) == (201, '"1"')
-    assert made.json() == {"id": 1, "name": "ball", "color": "#aabbcc", "default_size": None, "revision": 1}
+    assert made.json() == {
+        "id": 1,
+        "name": "ball",
+        "color": "#aabbcc",
+        "default_size": None,
+        "symmetry": {"kind": "none", "rotations": [], "axis": None, "flip": False},
+        "keypoints": [],
+        "mesh": None,
+        "revision": 1,
+    }
     one = made.headers["location"]
     assert client.get(one).json() == made.json()
     assert client.get(one).headers["etag"] == '"1"'

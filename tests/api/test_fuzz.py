@@ -72,6 +72,7 @@ BODIES: dict[str, st.SearchStrategy[Any]] = {
         inside=st.lists(corners, max_size=2),
         start=outlines,
     ),
+    "POST /labels/import": shaped(root=st.just("data"), path=texts, format=texts, dry_run=st.booleans()),
     "POST /classes": shaped(name=texts, color=texts),
     "PATCH /classes/0": shaped(name=texts, color=texts),
     "PATCH ": shaped(name=texts),

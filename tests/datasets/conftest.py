@@ -11,8 +11,11 @@ import pytest
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box
 from ars_web.geometry.camera import Camera
+from ars_web.geometry.keypoints import Keypoint
+from ars_web.geometry.symmetry import NO_SYMMETRY, Symmetry
 from ars_web.sessions.hull_mesh import HullMesh
 from ars_web.sessions.model import FrameTable, ObjectClass, SessionSnapshot, SessionState, VirtualBox
+from ars_web.sessions.object_mesh import ObjectMesh
 
 BENT = Camera(64, 48, 50.0, 51.0, 31.0, 24.5, "brown", (-0.2, 0.05, 0.001, -0.001, 0.0))
 FLAT = Camera(48, 64, 50.0, 50.0, 23.5, 31.5)
@@ -58,7 +61,8 @@ def write_images(folder: Path, names: list[str], sizes: list[tuple[int, int]]) -
 
 @pytest.fixture
 def make_snapshot(tmp_path: Path) -> Callable[..., SessionSnapshot]:
-    """Makes sessions of n frames with images on the disk, every fifth frame from a second camera; `hulls` by box."""
+    """Makes sessions of n frames with images on the disk, every fifth frame from a second camera; `hulls` and `meshes`
+    by box, `keypoints` and `symmetries` by class."""
 
     def make(
         n: int = 12,
@@ -70,8 +74,11 @@ def make_snapshot(tmp_path: Path) -> Callable[..., SessionSnapshot]:
         one_camera: bool = False,
         revision: int = 3,
         hulls: dict[int, HullMesh] | None = None,
+        meshes: dict[int, ObjectMesh] | None = None,
+        keypoints: dict[int, tuple[Keypoint, ...]] | None = None,
+        symmetries: dict[int, Symmetry] | None = None,
     ) -> SessionSnapshot:
-        hulls = hulls or {}
+        hulls, meshes, keypoints, symmetries = hulls or {}, meshes or {}, keypoints or {}, symmetries or {}
         names = [f"{i:04d}{suffix}" for i in range(n)]
         camera_ids = np.zeros(n, dtype=np.int64) if one_camera else (np.arange(n) % 5 == 4).astype(np.int64)
         sizes = [(FLAT.width, FLAT.height) if i else (BENT.width, BENT.height) for i in camera_ids.tolist()]
@@ -79,10 +86,26 @@ def make_snapshot(tmp_path: Path) -> Callable[..., SessionSnapshot]:
         state = SessionState(
             revision=revision,
             name=f"session {sid}",
-            classes={i: ObjectClass(i, name, "#e6194b", 1) for i, name in enumerate(classes)},
+            classes={
+                i: ObjectClass(
+                    i,
+                    name,
+                    "#e6194b",
+                    1,
+                    symmetry=symmetries.get(i, NO_SYMMETRY),
+                    keypoints=keypoints.get(i, ()),
+                )
+                for i, name in enumerate(classes)
+            },
             boxes={
                 i: VirtualBox(
-                    i, (i - 1) % len(classes), f"box {i}", box, 1, hull=hulls[i].digest if i in hulls else None
+                    i,
+                    (i - 1) % len(classes),
+                    f"box {i}",
+                    box,
+                    1,
+                    hull=hulls[i].digest if i in hulls else None,
+                    mesh=meshes[i].digest if i in meshes else None,
                 )
                 for i, box in enumerate(objects, 1)
             },
@@ -91,7 +114,14 @@ def make_snapshot(tmp_path: Path) -> Callable[..., SessionSnapshot]:
         )
         images = tuple(write_images(tmp_path / f"recording-{sid}" / "images", names, sizes))
         frames = FrameTable(tuple(names), images, camera_ids, circling(n))
-        return SessionSnapshot(sid, state, {0: BENT, 1: FLAT}, frames, {hull.digest: hull for hull in hulls.values()})
+        return SessionSnapshot(
+            sid,
+            state,
+            {0: BENT, 1: FLAT},
+            frames,
+            {hull.digest: hull for hull in hulls.values()},
+            {mesh.digest: mesh for mesh in meshes.values()},
+        )
 
     return make
 

@@ -13,11 +13,13 @@ import pytest
 from ars_web.datasets.forecast import forecast
 from ars_web.datasets.jobs import run_export
 from ars_web.datasets.options import ExportOptions
-from ars_web.datasets.plan import ExportPlan, plan_export
+from ars_web.datasets.plan import plan_export
 from ars_web.datasets.plan_files import digest_of, read_plan, write_plan
+from ars_web.datasets.planned import ExportPlan
 from ars_web.datasets.preview import draw_frame, labelled_frames
 from ars_web.datasets.registry import WRITERS
-from ars_web.datasets.samples import frame_labels, hulls_of, label_table, labels_in_frames, outlines_in_frames
+from ars_web.datasets.samples import frame_labels, label_table, labels_in_frames, outlines_in_frames
+from ars_web.datasets.shapes import meshes_of
 from ars_web.datasets.worker import start_worker
 from ars_web.geometry import labels as geometry
 from ars_web.geometry.mesh import Mesh
@@ -50,7 +52,7 @@ def area(ring: np.ndarray) -> float:
 
 def test_a_table_has_the_hulls_labels_beside_the_boxes_own(snapshot: SessionSnapshot) -> None:
     boxes = [box.box for box in snapshot.state.boxes.values()]
-    _, hull, _ = hulls_of(snapshot, shape=None)
+    _, hull, _ = meshes_of(snapshot, shape=None)
     assert hull is not None
     table, plain = label_table(snapshot, range(12)), label_table(snapshot, range(12), shape="box")
     for index in range(12):
@@ -70,9 +72,9 @@ def test_a_table_has_the_hulls_labels_beside_the_boxes_own(snapshot: SessionSnap
 
 def test_outlines_over_two_cameras_are_each_labels_own(snapshot: SessionSnapshot) -> None:
     frames, boxes = snapshot.frames, [box.box for box in snapshot.state.boxes.values()]
-    hulls = hulls_of(snapshot, shape=None)
+    hulls = meshes_of(snapshot, shape=None)
     wanted = np.random.default_rng(0).random((12, 3)) < 0.7
-    found = outlines_in_frames(snapshot.cameras, frames.camera_ids, frames.Ts_world_camera, boxes, wanted, hulls=hulls)
+    found = outlines_in_frames(snapshot.cameras, frames.camera_ids, frames.Ts_world_camera, boxes, wanted, meshes=hulls)
     for row in range(12):
         camera, T = snapshot.cameras[int(frames.camera_ids[row])], frames.Ts_world_camera[row]
         for column, (box, hull) in enumerate(zip(boxes, hulls, strict=True)):
@@ -100,7 +102,7 @@ def test_a_hull_follows_its_box(snapshot: SessionSnapshot) -> None:
     box = replace(moved, box=replace(moved.box, T_world_box=T_world_box, size=moved.box.size * 2))
     after = replace(snapshot, state=replace(snapshot.state, boxes={**snapshot.state.boxes, 2: box}))
     (before, _), (now, _) = (
-        (hull.vertices_world, hull.faces) for one in (snapshot, after) if (hull := hulls_of(one, shape=None)[1])
+        (hull.vertices_world, hull.faces) for one in (snapshot, after) if (hull := meshes_of(one, shape=None)[1])
     )
     np.testing.assert_allclose(
         now, (before - moved.box.T_world_box[:3, 3]) * 2 + T_world_box[:3, 3], rtol=0, atol=1e-12
@@ -114,10 +116,10 @@ def test_a_plan_carries_hulls_to_other_processes(
     write_plan(plan, tmp_path)
     again = read_plan(tmp_path, out=plan.out)
     assert digest_of(again) == digest_of(plan)
-    assert [[hull is not None for hull in session.hulls] for session in again.sessions] == [
+    assert [[hull is not None for hull in session.meshes] for session in again.sessions] == [
         [False] * 3, [False, True, False], [],
     ]  # fmt: skip
-    (one, two) = (session.hulls[1] for session in (plan.sessions[1], again.sessions[1]))
+    (one, two) = (session.meshes[1] for session in (plan.sessions[1], again.sessions[1]))
     assert isinstance(one, Mesh)
     assert isinstance(two, Mesh)
     assert np.array_equal(one.vertices_world, two.vertices_world)
@@ -247,6 +249,6 @@ def test_a_picture_shows_the_hull(snapshot: SessionSnapshot, make_snapshot: Make
 
 def test_visible_shares_are_of_the_hulls_part_of_the_image(snapshot: SessionSnapshot) -> None:
     frames, boxes = snapshot.frames, [box.box for box in snapshot.state.boxes.values()]
-    hulls = hulls_of(snapshot, shape=None)
-    table = labels_in_frames(snapshot.cameras, frames.camera_ids, frames.Ts_world_camera, boxes, hulls=hulls)
+    hulls = meshes_of(snapshot, shape=None)
+    table = labels_in_frames(snapshot.cameras, frames.camera_ids, frames.Ts_world_camera, boxes, meshes=hulls)
     assert np.array_equal(np.isnan(table.visible), np.isnan(table.bbox[..., 0]))

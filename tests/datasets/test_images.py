@@ -46,6 +46,7 @@ def test_names_keep_what_they_are() -> None:
     assert image_name("a", "/x/a.jpeg", only_jpeg=True) == "a.jpg"
     assert image_name("a", "/x/a.PNG", only_jpeg=True) == "a.jpg"
     assert image_name("a", "/x/a", only_jpeg=False) == "a.png"
+    assert image_name("a", "/x/a.JPG", only_jpeg=False, only_png=True) == "a.png"
 
 
 def test_links_share_the_file_and_copies_do_not(tmp_path: Path) -> None:

@@ -18,11 +18,13 @@ def given(name: str, value: object) -> dict[str, Any]:
 
 def test_every_option_is_there_but_those_that_leave_no_choice() -> None:
     assert list(OPTIONS) == [
-        "frames.step", "frames.start", "frames.stop", "frames.list", "images", "shape", "min_visible",
-        "max_truncated", "min_area_px", "split.train", "split.val", "split.test", "split.by", "split.seed", "sessions",
+        "frames.step", "frames.start", "frames.stop", "frames.list", "images", "shape", "masks", "min_visible",
+        "max_truncated", "min_area_px", "heading_bins", "split.train", "split.val", "split.test", "split.by",
+        "split.seed", "sessions",
     ]  # fmt: skip
     assert {name: option.type for name, option in OPTIONS.items() if option.type not in ("integer", "number")} == {
-        "frames.list": "integers", "images": "choice", "shape": "choice", "split.by": "choice", "sessions": "texts",
+        "frames.list": "integers", "images": "choice", "shape": "choice", "masks": "choice", "split.by": "choice",
+        "sessions": "texts",
     }  # fmt: skip
 
 
@@ -60,8 +62,8 @@ def test_every_choice_can_be_made_and_says_what_it_means(option: ExportOption) -
         ExportOptions.model_validate(given(option.name, choice.value))
 
 
-def test_the_shape_that_nobody_chose_is_the_hull_and_meshes_are_not_offered() -> None:
+def test_the_shape_that_nobody_chose_is_the_hull() -> None:
     shape = OPTIONS["shape"]
     assert ExportOptions.model_validate({}).shape is None
     assert (shape.default, shape.optional) == ("hull", False)
-    assert [choice.value for choice in shape.choices] == ["box", "hull"]
+    assert [choice.value for choice in shape.choices] == ["box", "hull", "mesh"]

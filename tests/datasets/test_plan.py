@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from ars_web.datasets.options import ExportOptions, FrameChoice
-from ars_web.datasets.plan import ExportPlan, plan_export
+from ars_web.datasets.plan import plan_export
 from ars_web.datasets.plan_files import digest_of, read_digest, read_plan, write_plan
+from ars_web.datasets.planned import ExportPlan
+from ars_web.datasets.registry import WRITERS
 from ars_web.errors import BadFile, BadInput
 from ars_web.sessions.model import SessionSnapshot
 
@@ -137,7 +139,7 @@ def test_folders_in_use_are_refused(make_snapshot: Make, tmp_path: Path) -> None
 
 def test_unknown_formats_and_meshes_are_refused(make_snapshot: Make, tmp_path: Path) -> None:
     snapshot = make_snapshot(1)
-    with pytest.raises(BadInput, match="'nope' is unknown; known are yolo, coco, voc, ars"):
+    with pytest.raises(BadInput, match=f"'nope' is unknown; known are {', '.join(WRITERS)}"):
         plan_of(snapshot, out=tmp_path / "d", format="nope")
     with pytest.raises(BadInput, match="mesh"):
         plan_of(snapshot, out=tmp_path / "d", shape="mesh")

@@ -23,6 +23,17 @@ def test_pictures_are_spread_over_the_labelled_frames(make_snapshot: Make, tmp_p
         assert cv2.imread(str(path)).shape[1] >= 960
 
 
+def test_pictures_show_what_a_format_holds(make_snapshot: Make, tmp_path: Path) -> None:
+    snapshot = make_snapshot(12)
+    drawn = {
+        kind: preview(snapshot, tmp_path / str(kind), count=1, format=kind)[0].read_bytes()
+        for kind in (None, "yolo", "coco")
+    }
+    assert len(set(drawn.values())) == 3
+    with pytest.raises(BadInput, match="'xyz' is unknown"):
+        preview(snapshot, tmp_path / "xyz", format="xyz")
+
+
 def test_spreading() -> None:
     assert spread(range(10), 3) == [1, 5, 8]
     assert spread([4, 7], 6) == [4, 7]

@@ -33,6 +33,7 @@ from ars_web.sessions.editing import MaskDraft, SessionEditor
 from ars_web.sessions.edits import Edit
 from ars_web.sessions.hull_mesh import HullMesh
 from ars_web.sessions.model import HullOptions, SessionState
+from ars_web.sessions.object_mesh import MeshSource, ObjectMesh, SourcedMesh
 from ars_web.sessions.store import SessionStore
 
 TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
@@ -72,7 +73,7 @@ def edit_for_ever(folder: Path, sid: str, *, seed: int, pipe: int, without: str 
 def edit_once(store: SessionStore, editor: SessionEditor, sid: str, chance: random.Random) -> None:
     state, author = store.state(sid), chance.choice(["ann", "bob"])
     boxes, masks = list(state.boxes.values()), list(state.masks.values())
-    deeds = ["add", "add", "move", "move", "delete", "class", "outline", "object", "unmask", "undo", "redo"]
+    deeds = ["add", "add", "move", "move", "delete", "class", "outline", "object", "unmask", "mesh", "undo", "redo"]
     try:
         match chance.choice(deeds):
             case "add":
@@ -112,6 +113,11 @@ def edit_once(store: SessionStore, editor: SessionEditor, sid: str, chance: rand
                     expected_masks={} if mask is None else {mask.id: mask.revision},
                     author=author,
                 )
+            case "mesh":
+                mesh = ObjectMesh(np.eye(4, 3) * chance.uniform(0.1, 1.0), TETRAHEDRON)
+                sourced = SourcedMesh(mesh, MeshSource("m.stl", "m", "x,y,z", "file"))
+                revision = state.classes[0].revision
+                editor.change_class(sid, 0, expected_revision=revision, mesh=sourced, fit_size=None, author=author)
             case "unmask" if masks:
                 mask = chance.choice(masks)
                 editor.delete_mask(sid, mask.id, expected_revision=mask.revision, author=author)

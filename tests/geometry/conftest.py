@@ -32,6 +32,12 @@ def mesh_oracle() -> ModuleType:
 
 
 @pytest.fixture(scope="session")
+def shape_oracle() -> ModuleType:
+    """`shape_oracle.py`, the slow readable version of visibility among shapes."""
+    return _beside("shape_oracle")
+
+
+@pytest.fixture(scope="session")
 def hulls() -> ModuleType:
     """`hull_oracle.py`, the slow readable version of the visual hull, with shapes and cameras round them."""
     return _beside("hull_oracle")

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+import trimesh
 
 from ars_web.errors import BadInput
 from ars_web.geometry.mesh import Mesh
@@ -54,3 +55,22 @@ def test_an_edge_of_four_faces_is_allowed():
 def test_what_is_no_closed_mesh_is_refused(vertices, faces, message):
     with pytest.raises(BadInput, match=message):
         Mesh(vertices, faces)
+
+
+def test_the_convex_hulls_vertices_reach_as_far_as_all_vertices_in_every_direction():
+    random = np.random.default_rng(0)
+    ball = random.normal(size=(300, 3)) @ random.normal(size=(3, 3)) * 0.01 + [500, -20, 3]
+    flat = np.column_stack([random.normal(size=(300, 2)), np.ones(300)]) @ random.normal(size=(3, 3))
+    directions = random.normal(size=(200, 3))
+    can = (
+        np.array(trimesh.creation.cylinder(0.03, 0.1, sections=150).vertices)[:300]
+        + random.normal(size=(300, 3)) * 1e-5
+    )
+    for points, most in ((ball, 100), (can, 300), (flat, 300)):
+        # Any faces, once each way round, that have all vertices but the last, which belongs to none.
+        faces = np.arange(300).reshape(-1, 3)
+        mesh = Mesh(np.concatenate([points, [[1e4, 0, 0]]]), np.concatenate([faces, faces[:, ::-1]]))
+        found = mesh.hull_vertices_world
+        assert len(found) <= most
+        reach = np.abs((points @ directions.T).max(axis=0) - (found @ directions.T).max(axis=0))
+        assert reach.max() < 1e-9 * np.ptp(points, axis=0).max()

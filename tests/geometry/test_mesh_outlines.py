@@ -15,7 +15,8 @@ from ars_web.geometry.camera import Camera
 from ars_web.geometry.labels import NEAR, outline
 from ars_web.geometry.mesh import Mesh
 from ars_web.geometry.mesh_labels import labels_of_meshes
-from ars_web.geometry.mesh_outlines import joined, mesh_outline, mesh_outlines
+from ars_web.geometry.mesh_outlines import joined, mesh_outline, mesh_outlines, mesh_regions
+from ars_web.geometry.mesh_silhouette import silhouette
 
 PINHOLE = Camera(640, 480, 500.0, 500.0, 319.5, 239.5)
 IDENTITY = np.eye(4)
@@ -160,3 +161,76 @@ def test_a_mesh_behind_the_camera_has_no_outline():
 def test_a_tolerance_too_fine_is_refused():
     with pytest.raises(BadInput, match=r"at least 0\.001 pixels"):
         mesh_outline(PINHOLE, IDENTITY, cuboid(0, 0, 1, (1, 1, 1)), tolerance=0.0)
+
+
+# Rings with holes
+
+
+def region_of(rings: list[np.ndarray]) -> shapely.Geometry:
+    """What rings enclose: each that runs clockwise is a hole of the last before it that does not."""
+    polygons: list[tuple[np.ndarray, list[np.ndarray]]] = []
+    for ring in rings:
+        if area(ring) > 0:
+            polygons.append((ring, []))
+        else:
+            polygons[-1][1].append(ring)
+    found = [shapely.Polygon(outer, holes) for outer, holes in polygons]
+    assert all(shapely.area(shapely.Polygon(outer)) > 0 for outer, _ in polygons)
+    assert all(polygon.buffer(1e-6).is_valid for polygon in found)
+    return shapely.MultiPolygon(found)
+
+
+def regions(camera: Camera, T_world_camera: np.ndarray, mesh: Mesh) -> list[np.ndarray]:
+    found = mesh_regions(camera, T_world_camera[None], [mesh], np.ones((1, 1), dtype=bool))
+    assert found.label_starts.tolist() == [0, len(found.ring_starts) - 1]
+    return found.of(0)
+
+
+def test_separate_rings_enclose_what_the_one_ring_does_and_what_the_silhouette_is(random_scene, solids):
+    holes = 0
+    for seed in range(60):
+        camera, T_world_camera, box = random_scene(seed)
+        mesh = placed(list(solids.values())[seed % len(solids)], box)
+        rings, ring = regions(camera, T_world_camera, mesh), mesh_outline(camera, T_world_camera, mesh)
+        assert bool(rings) == bool(len(ring))
+        if not rings:
+            continue
+        holes += sum(area(one) < 0 for one in rings)
+        region = region_of(rings)
+        assert region.area == pytest.approx(area(ring), rel=1e-9), f"scene {seed}"
+        image = shapely.box(0, 0, camera.width, camera.height)
+        # Far beyond what is in these images.
+        whole = silhouette(camera, T_world_camera, mesh.vertices_world, mesh.faces, reach=20.0)
+        apart = region.buffer(0).symmetric_difference(shapely.make_valid(whole).intersection(image)).area
+        assert apart < 0.2 * region.length + 1, f"scene {seed}"
+    assert holes
+
+
+def test_a_hole_follows_the_ring_that_it_is_in(solids):
+    # A small torus beside a larger one, with a bead in the larger one's hole.
+    large = placed(solids["torus"], upright(-0.1, 0, 1, (0.3, 0.3, 0.1)))
+    small = placed(solids["torus"], upright(0.2, 0, 1, (0.2, 0.2, 0.1)))
+    bead = cuboid(-0.1, 0, 1, (0.02, 0.02, 0.02))
+    parts = [bead, small, large]
+    starts = np.cumsum([0, *(len(part.vertices_world) for part in parts)])
+    mesh = Mesh(
+        np.concatenate([part.vertices_world for part in parts]),
+        np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=False)]),
+    )
+    rings = regions(PINHOLE, IDENTITY, mesh)
+    assert [area(ring) > 0 for ring in rings] == [True, False, True, False, True]
+    assert_allclose([ring.mean(axis=0)[0] for ring in rings], [270, 270, 420, 420, 270], atol=3)
+
+
+def test_rings_of_many_labels_are_kept_apart(random_scene, solids):
+    camera, T_world_camera, box = random_scene(3)
+    meshes = [placed(solids["torus"], box), placed(solids["two"], box)]
+    Ts = np.repeat(T_world_camera[None], 4, axis=0)
+    wanted = np.array([[True, True], [False, True], [False, False], [True, False]])
+    found = mesh_regions(camera, Ts, meshes, wanted)
+    assert found.label_starts.shape == (9,)
+    for label, asked in enumerate(wanted.ravel()):
+        want = regions(camera, T_world_camera, meshes[label % 2]) if asked else []
+        for one, other in zip(found.of(label), want, strict=True):
+            assert_array_equal(one, other)
+    assert mesh_regions(camera, Ts[:0], meshes, wanted[:0]).label_starts.tolist() == [0]

@@ -17,6 +17,7 @@ from ars_web.recordings.recording import Frame, Recording
 from ars_web.sessions import migration
 from ars_web.sessions.editing import SessionEditor
 from ars_web.sessions.hull_mesh import HullMesh
+from ars_web.sessions.object_mesh import MeshSource, ObjectMesh, SourcedMesh
 from ars_web.sessions.store import SessionStore
 
 MakeRecording = Callable[..., Recording]
@@ -97,6 +98,18 @@ def a_hull() -> Callable[..., HullMesh]:
 
 
 @pytest.fixture
+def a_mesh() -> Callable[..., SourcedMesh]:
+    """A tetrahedron, as high in metres as asked, and the file that it might be from."""
+
+    def make(height: float = 1.0, *, name: str = "corner.stl") -> SourcedMesh:
+        corners = np.array([[0.0, 0.0, 0.0], [0.25, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, height]])
+        mesh = ObjectMesh(corners, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]))
+        return SourcedMesh(mesh, MeshSource(name, "mm", "x,-z,y", "centre"))
+
+    return make
+
+
+@pytest.fixture
 def made_by_older_program() -> Callable[[Path, str], None]:
     """Makes a session's database, which nobody has open, anew as the program with an older schema would have."""
     return _make_older
@@ -130,7 +143,13 @@ def _make_older(path: Path, schema: str) -> None:
 
 _OF_0003 = ("locked", "default_size")
 _OF_0004 = ("hull", "hull_options", "masks", "next_mask_id")
-_LATER = {"0001": (*_OF_0003, *_OF_0004), "0002": (*_OF_0003, *_OF_0004), "0003": _OF_0004}
+_OF_0005 = ("mesh", "symmetry", "keypoints")
+_LATER = {
+    "0001": (*_OF_0003, *_OF_0004, *_OF_0005),
+    "0002": (*_OF_0003, *_OF_0004, *_OF_0005),
+    "0003": (*_OF_0004, *_OF_0005),
+    "0004": _OF_0005,
+}
 """What databases of a schema do not hold, in columns and JSON."""
 
 
@@ -139,7 +158,7 @@ def _forget_what_is_new(connection: sqlite3.Connection, select: str, update: str
 
     def older(item: dict[str, object]) -> dict[str, object]:
         said = {key: value for key, value in item.items() if key not in later}
-        return {**said, "has_hull": False} if "rotation" in item else said
+        return {**said, "has_hull": False} if "rotation" in item and "hull" in later else said
 
     for text, key in connection.execute(select).fetchall():
         connection.execute(update, (json.dumps(json.loads(text, object_hook=older)), key))

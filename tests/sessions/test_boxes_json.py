@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,16 +13,19 @@ from hypothesis import strategies as st
 from ars_web.errors import BadFile
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box
+from ars_web.geometry.keypoints import Keypoint
+from ars_web.geometry.symmetry import Symmetry
 from ars_web.sessions.boxes_json import BoxJson, BoxPatchJson, box_json, class_json, read_boxes_file
 from ars_web.sessions.editing import SessionEditor
 from ars_web.sessions.hull_mesh import HullMesh
 from ars_web.sessions.model import HullOptions, ObjectClass, VirtualBox
+from ars_web.sessions.object_mesh import SourcedMesh
 from ars_web.sessions.store import SessionStore
 
 GOOD = {"class_id": 0, "T_world_box": {"position": [0, 0.5, 1], "wxyz": [2, 0, 0, 0]}, "size": [1, 2, 3.5]}
 
 
-def test_a_box_is_written_as_the_contract_says():
+def test_boxes_and_classes_are_written_as_the_contract_says(a_mesh: Callable[..., SourcedMesh]):
     T = rigid_transform.from_position_wxyz(np.array([1.0, 2.0, 3.0]), np.array([-0.5, 0.5, 0.5, 0.5]))
     written = box_json(VirtualBox(7, 1, "left", Box(T, np.array([0.1, 0.2, 0.3])), 12))
     assert list(written) == [
@@ -32,6 +36,7 @@ def test_a_box_is_written_as_the_contract_says():
         "size",
         "has_hull",
         "hull_options",
+        "has_mesh",
         "locked",
         "revision",
     ]
@@ -39,9 +44,36 @@ def test_a_box_is_written_as_the_contract_says():
     assert written["T_world_box"]["position"] == [1.0, 2.0, 3.0]
     assert written["T_world_box"]["wxyz"] == pytest.approx([0.5, -0.5, -0.5, -0.5])
     assert (written["size"], written["has_hull"], written["revision"]) == ([0.1, 0.2, 0.3], False, 12)
-    assert class_json(ObjectClass(0, "cube", "#56b4e9", 3)) == {
-        "id": 0, "name": "cube", "color": "#56b4e9", "default_size": None, "revision": 3,
-    }  # fmt: skip
+    plain = ObjectClass(0, "cube", "#56b4e9", 3)
+    written = {
+        "id": 0,
+        "name": "cube",
+        "color": "#56b4e9",
+        "default_size": None,
+        "symmetry": {"kind": "none", "rotations": [], "axis": None, "flip": False},
+        "keypoints": [],
+        "mesh": None,
+        "revision": 3,
+    }
+    assert class_json(plain, {}) == written
+    sourced = a_mesh()
+    shaped = replace(
+        plain,
+        mesh=sourced.mesh.digest,
+        symmetry=Symmetry("continuous", axis=(0.0, 0.0, 1.0), flip=True),
+        keypoints=(Keypoint("tip", (0.0, 0.0, 0.5)),),
+    )
+    round_its_z = {"kind": "continuous", "rotations": [], "axis": [0.0, 0.0, 1.0], "flip": True}
+    tip = [{"name": "tip", "place": [0.0, 0.0, 0.5]}]
+    expected = {**written, "symmetry": round_its_z, "keypoints": tip, "mesh": {"digest": shaped.mesh}}
+    assert class_json(shaped, {}) == expected
+    assert class_json(shaped, {sourced.mesh.digest: sourced})["mesh"] == {
+        "digest": shaped.mesh,
+        "vertices": 4,
+        "faces": 4,
+        "extent": [0.25, 0.5, 1.0],
+        "source": {"name": "corner.stl", "unit": "mm", "axes": "x,-z,y", "origin": "centre"},
+    }
 
 
 numbers = st.floats(-1e6, 1e6)

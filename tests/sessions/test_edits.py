@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 from ars_web.errors import Conflict
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box
+from ars_web.geometry.keypoints import Keypoint
 from ars_web.geometry.polygon import Polygon
+from ars_web.geometry.symmetry import NO_SYMMETRY, Symmetry
 from ars_web.sessions.edit_json import changes_from_json, changes_json, state_from_json, state_json
 from ars_web.sessions.edits import (
     BoxChange,
@@ -169,9 +171,9 @@ options = st.builds(
     st.none() | numbers,
 )
 boxes = st.builds(
-    lambda id_, position, wxyz, size, revision, hull: VirtualBox(
+    lambda id_, position, wxyz, size, revision, hull, mesh: VirtualBox(
         id_, 0, "b", Box(rigid_transform.from_position_wxyz(np.array(position), np.array(wxyz)), np.array(size)),
-        revision, False, *hull,
+        revision, False, *hull, mesh,
     ),
     st.integers(1, 5),
     st.tuples(numbers, numbers, numbers),
@@ -179,6 +181,7 @@ boxes = st.builds(
     st.tuples(*[st.floats(1e-6, 1e3)] * 3),
     st.integers(0, 10**6),
     st.tuples(st.sampled_from(["0a" * 32, "b1" * 32]), st.none() | options) | st.just((None, None)),
+    st.none() | st.just("2c" * 32),
 )  # fmt: skip
 pixels = st.tuples(numbers, numbers)
 rings = st.lists(pixels, min_size=3, max_size=5).map(np.array)
@@ -193,8 +196,25 @@ masks = st.builds(
     st.booleans(),
     st.integers(0, 10**6),
 )
+axes = st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda axis: np.linalg.norm(axis) > 1e-3)
+symmetries = st.one_of(
+    st.just(NO_SYMMETRY),
+    st.builds(lambda axis, order: Symmetry("discrete", ((axis, order),)), axes, st.integers(2, 72)),
+    st.builds(lambda axis, flip: Symmetry("continuous", axis=axis, flip=flip), axes, st.booleans()),
+)
+places = st.tuples(*[st.floats(-2, 2)] * 3)
 classes = st.builds(
-    ObjectClass, st.integers(0, 5), st.text("abcö漢", min_size=1), st.just("#aabbcc"), st.integers(0, 9)
+    ObjectClass,
+    st.integers(0, 5),
+    st.text("abcö漢", min_size=1),
+    st.just("#aabbcc"),
+    st.integers(0, 9),
+    st.none() | st.just((0.1, 0.2, 0.3)),
+    st.none() | st.just("2c" * 32),
+    symmetries,
+    st.dictionaries(st.text("abö", min_size=1, max_size=3), places, max_size=3).map(
+        lambda points: tuple(Keypoint(name, place) for name, place in points.items())
+    ),
 )
 changes = st.one_of(
     st.builds(lambda a, b: BoxChange(a.id, a, b and replace(b, id=a.id)), boxes, st.none() | boxes),
@@ -260,6 +280,14 @@ def test_differences_name_what_differs():
     assert differences(state, other) == ["name: 's' and 't'", "box 1", "box 2", "mask 3"]
     hulls = [replace(state, boxes={1: replace(a_box(2), hull=hull)}) for hull in ("0a" * 32, "b1" * 32, None)]
     assert [differences(a, b) for a in hulls for b in hulls].count([]) == 3
+    shaped = cube_class(2)
+    for unlike in (
+        replace(shaped, mesh="0a" * 32), replace(shaped, symmetry=Symmetry("continuous", axis=(0.0, 0.0, 1.0))),
+        replace(shaped, keypoints=(Keypoint("tip", (0.0, 0.0, 0.5)),)), replace(shaped, default_size=(1.0, 1.0, 1.0)),
+    ):  # fmt: skip
+        assert differences(replace(state, classes={0: shaped}), replace(state, classes={0: unlike})) == ["class 0"]
+    meshed = replace(a_box(2), mesh="0a" * 32)
+    assert differences(replace(state, boxes={1: a_box(2)}), replace(state, boxes={1: meshed})) == ["box 1"]
     base = a_mask(2)
     for unlike in (
         replace(base, frame=1), replace(base, box_id=2), replace(base, class_id=1), replace(base, origin="smart"),

@@ -20,13 +20,14 @@ from ars_web.sessions.editing import MaskDraft, SessionEditor
 from ars_web.sessions.edits import differences
 from ars_web.sessions.hull_mesh import HullMesh
 from ars_web.sessions.model import SessionState
+from ars_web.sessions.object_mesh import SourcedMesh
 from ars_web.sessions.store import SessionStore
 
 MakeBox = Callable[..., Box]
 MakeOlder = Callable[[Path, str], None]
 
 
-@pytest.fixture(params=["0001", "0002", "0003"])
+@pytest.fixture(params=["0001", "0002", "0003", "0004"])
 def old(
     request: pytest.FixtureRequest,
     store: SessionStore,
@@ -61,6 +62,7 @@ def test_an_old_database_is_migrated_when_it_is_opened_and_backed_up_before(
     old: SessionState,
     a_box: MakeBox,
     a_hull: Callable[..., HullMesh],
+    a_mesh: Callable[..., SourcedMesh],
     outline: Callable[..., tuple[Polygon, ...]],
 ):
     path = store.folder / sid / "session.sqlite"
@@ -83,6 +85,8 @@ def test_an_old_database_is_migrated_when_it_is_opened_and_backed_up_before(
         author="me",
     )  # fmt: skip
     assert (made.has_hull, list(store.state(sid).masks)) == (True, [1])
+    shaped = editor.change_class(sid, 0, expected_revision=0, mesh=a_mesh(), fit_size=True, author="me")
+    assert (shaped.mesh, shaped.default_size) == (a_mesh().mesh.digest, (0.25, 0.5, 1.0))
     assert all("images are not where" in problem for problem in store.check())
 
 
@@ -93,7 +97,7 @@ def test_a_step_that_fails_leaves_the_old_database(
     before, old_schema = dump(path), schema(path)
     scripts = tmp_path / "migrations"
     shutil.copytree(migration.SCRIPTS, scripts, ignore=shutil.ignore_patterns("__pycache__"))
-    step = scripts / "versions" / "0004_masks.py"
+    step = scripts / "versions" / "0005_meshes.py"
     step.write_text(step.read_text() + '    op.execute("DELETE FROM edit")\n    op.execute("SELECT * FROM nowhere")\n')
     with pytest.raises(
         StoreError, match=rf"from schema {old_schema} to {migration.SCHEMA} failed and was taken back: .*nowhere"
@@ -110,7 +114,7 @@ def test_a_step_that_leaves_rows_without_what_they_refer_to_fails(
     before = dump(path)
     scripts = tmp_path / "migrations"
     shutil.copytree(migration.SCRIPTS, scripts, ignore=shutil.ignore_patterns("__pycache__"))
-    step = scripts / "versions" / "0004_masks.py"
+    step = scripts / "versions" / "0005_meshes.py"
     step.write_text(step.read_text() + '    op.execute("DELETE FROM object_class")\n')
     with pytest.raises(StoreError, match="rows are left without the row they refer to"):
         migration.bring_up_to_date(path, scripts=scripts)

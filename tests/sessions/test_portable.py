@@ -14,7 +14,9 @@ import pytest
 
 from ars_web.errors import BadFile, BadInput, NotFound, RefusedPath, StoreError, TooLarge
 from ars_web.geometry.box import Box
+from ars_web.geometry.keypoints import Keypoint
 from ars_web.geometry.polygon import Polygon
+from ars_web.geometry.symmetry import Symmetry
 from ars_web.recordings.recording import Recording, SkippedFrame
 from ars_web.sessions import migration, session_folders
 from ars_web.sessions.archive import ArchiveLimits
@@ -22,6 +24,7 @@ from ars_web.sessions.editing import MaskDraft, SessionEditor
 from ars_web.sessions.edits import Edit, differences
 from ars_web.sessions.hull_mesh import HullMesh
 from ars_web.sessions.model import HullOptions
+from ars_web.sessions.object_mesh import SourcedMesh
 from ars_web.sessions.portable import export_session, import_session
 from ars_web.sessions.store import SessionStore
 
@@ -42,19 +45,27 @@ def plain(store: SessionStore, editor: SessionEditor, make_recording: Callable[.
 
 @pytest.fixture
 def sid(
+    store: SessionStore,
     editor: SessionEditor,
     plain: str,
     a_box: MakeBox,
     a_hull: Callable[..., HullMesh],
+    a_mesh: Callable[..., SourcedMesh],
     outline: Callable[..., tuple[Polygon, ...]],
 ) -> str:
-    """That session with a box, its hull and masks, and an outline without a box."""
+    """That session with a box, its hull, masks and mesh, a class with a shape, and an outline without a box."""
     sid = plain
+    editor.change_class(
+        sid, 0, expected_revision=store.state(sid).classes[0].revision, mesh=a_mesh(), author="you",
+        symmetry=Symmetry("continuous", axis=(0.0, 0.0, 1.0)), keypoints=[Keypoint("tip", (0.0, 0.0, 0.5))],
+    )  # fmt: skip
     masks = [MaskDraft(frame, outline(20 + frame)) for frame in (0, 2)]
     editor.put_object(
         sid, box_id=None, class_id=0, box=a_box(1.0), hull=a_hull(), hull_options=HullOptions("upright"),
         masks=masks, author="you",
     )  # fmt: skip
+    made = store.state(sid).boxes[2]
+    editor.change_box(sid, 2, expected_revision=made.revision, mesh=a_mesh(0.5), author="you")
     editor.put_mask(sid, box_id=None, frame=1, class_id=0, polygons=outline(), expected_revision=None, author="you")
     return sid
 
@@ -92,6 +103,11 @@ def test_a_session_comes_back_whole(
         k: hull.vertices.tolist() for k, hull in original.hulls.items()
     }
     assert (len(carried.hulls), len(carried.state.masks)) == (1, 3)
+    assert [mesh.digest for mesh in carried.meshes.values()] == list(carried.meshes)
+    assert set(carried.meshes) == set(original.meshes) == {carried.state.classes[0].mesh, carried.state.boxes[2].mesh}
+    assert all(
+        elsewhere.mesh(imported.id, digest).source == store.mesh(sid, digest).source for digest in carried.meshes
+    )
     assert carried.cameras == cameras
     assert carried.frames.names == original.frames.names
     assert np.array_equal(carried.frames.Ts_world_camera, original.frames.Ts_world_camera)
@@ -106,9 +122,9 @@ def test_a_session_comes_back_whole(
 def test_an_import_may_be_given_a_name(store: SessionStore, elsewhere: SessionStore, sid: str, tmp_path: Path):
     export_session(store, sid, tmp_path / "carried")
     imported = import_session(elsewhere, tmp_path / "carried", name="desk")
-    assert (imported.name, imported.revision) == ("desk", 7)
-    assert elsewhere.edits(imported.id, after=6)[0].summary == "Rename the session to desk"
-    assert import_session(elsewhere, tmp_path / "carried", name="table").revision == 6
+    assert (imported.name, imported.revision) == ("desk", 9)
+    assert elsewhere.edits(imported.id, after=8)[0].summary == "Rename the session to desk"
+    assert import_session(elsewhere, tmp_path / "carried", name="table").revision == 8
     with pytest.raises(BadInput, match="a session needs a name"):
         import_session(elsewhere, tmp_path / "carried", name="")
 
@@ -385,6 +401,59 @@ TAMPERINGS = {
         """UPDATE edit SET changes = replace(changes, '"hull":"', '"hull":"../')""",
         "an entry of the session's log cannot be read: a hull is named by 64",
     ),
+    "a mesh that is gone": (
+        "UPDATE box SET mesh = NULL; UPDATE object_class SET mesh = NULL; DELETE FROM mesh",
+        "a class or a box of the log has mesh [0-9a-f]{64}, which is not there",
+    ),
+    "a mesh without its row": (
+        "PRAGMA foreign_keys = OFF; DELETE FROM mesh",
+        "a row of (box|object_class) refers to a row of mesh that is not there",
+    ),
+    "a mesh under another's name": (
+        "UPDATE mesh SET vertices = zeroblob(48)",
+        "mesh '[0-9a-f]{64}' in the session's database is damaged: it holds another one",
+    ),
+    "a mesh that is open": (
+        f"UPDATE mesh SET faces = x'{'000000000100000002000000' * 2}'",
+        "mesh .* is damaged: .*must be closed",
+    ),
+    "a mesh cut short": (
+        "UPDATE mesh SET faces = x'ff0000'",
+        "mesh .* is damaged",
+    ),
+    "a mesh in a unit that is none": (
+        "UPDATE mesh SET unit = 'ells'",
+        "mesh .* is damaged: a mesh's unit must be one of",
+    ),
+    "a mesh with axes that are none": (
+        "UPDATE mesh SET axes = 'up'",
+        "mesh .* is damaged: a mesh's axes must be such as",
+    ),
+    "a mesh's name in the log that is none": (
+        """UPDATE edit SET changes = replace(changes, '"mesh":"', '"mesh":"../')""",
+        "an entry of the session's log cannot be read: a mesh is named by 64",
+    ),
+    "a symmetry that is none": (
+        "UPDATE object_class SET symmetry = '{}'",
+        "a class's symmetry in the session's database cannot be read",
+    ),
+    "a symmetry of nonsense": (
+        """UPDATE object_class SET symmetry = '{"kind": "discrete", "rotations": [7]}'""",
+        "a class's symmetry in the session's database cannot be read",
+    ),
+    "a symmetry changed in the table": (
+        """UPDATE object_class SET symmetry = replace(symmetry, 'false', 'true')""",
+        "the log and the tables differ in class 0",
+    ),
+    "keypoints that are none": (
+        "UPDATE object_class SET keypoints = '[1]'",
+        "a class's keypoints in the session's database cannot be read",
+    ),
+    "keypoints of one name in the log": (
+        """UPDATE edit SET changes = replace(changes, '"keypoints":[{',
+            '"keypoints":[{"name":"tip","place":[0,0,0]},{')""",
+        "an entry of the session's log cannot be read: there are two keypoints",
+    ),
     "a mask moved in the table": (
         "UPDATE mask SET polygons = replace(polygons, '80.0', '81.0')",
         "the log and the tables differ in mask",
@@ -463,7 +532,7 @@ def test_archives_are_unpacked_within_limits(elsewhere: SessionStore, carried: P
     assert not (tmp_path / "escaped").exists()
 
 
-@pytest.mark.parametrize("schema", ["0001", "0002", "0003"])
+@pytest.mark.parametrize("schema", ["0001", "0002", "0003", "0004"])
 def test_an_older_programs_session_is_migrated_on_its_way_in(
     store: SessionStore,
     elsewhere: SessionStore,

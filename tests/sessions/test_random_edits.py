@@ -9,11 +9,14 @@ from hypothesis import strategies as st
 from ars_web.errors import ArsError
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box
+from ars_web.geometry.keypoints import Keypoint
 from ars_web.geometry.polygon import Polygon
+from ars_web.geometry.symmetry import NO_SYMMETRY, Symmetry
 from ars_web.sessions.editing import MaskDraft, SessionEditor
 from ars_web.sessions.edits import differences, replay
 from ars_web.sessions.hull_mesh import HullMesh
 from ars_web.sessions.model import HullOptions, SessionState
+from ars_web.sessions.object_mesh import MeshSource, ObjectMesh, SourcedMesh
 from ars_web.sessions.store import SessionStore
 
 steps = st.lists(
@@ -31,6 +34,10 @@ steps = st.lists(
                 "size",
                 "lock",
                 "duplicate",
+                "mesh",
+                "class mesh",
+                "symmetry",
+                "keypoints",
                 "mask",
                 "mask",
                 "unmask",
@@ -70,7 +77,9 @@ def test_whatever_is_done_the_state_is_what_the_log_replays(
         new = set(state.boxes) - set(before.boxes)
         places = [(mask.box_id, mask.frame) for mask in state.masks.values()]
         assert len(set(places)) == len(places)
-        assert {box.hull for box in state.boxes.values()} - {None} == set(store.snapshot(sid).hulls)
+        snapshot = store.snapshot(sid)
+        assert {box.hull for box in state.boxes.values()} - {None} == set(snapshot.hulls)
+        assert state.meshes_named == set(snapshot.meshes) == set(store.meshes(sid))
         if action == "add":
             assert not new & given_ids
             given_ids |= new
@@ -83,7 +92,17 @@ def test_whatever_is_done_the_state_is_what_the_log_replays(
 
 
 TRIANGLE = np.array([[0.0, 0.0], [9.0, 0.0], [9.0, 7.5]])
+MESH_FILE = MeshSource("corner.stl", "mm", "x,y,z", "file")
+SHAPES = [
+    NO_SYMMETRY,
+    Symmetry("discrete", (((0.0, 0.0, 1.0), 4), ((1.0, 0.0, 0.0), 2))),
+    Symmetry("continuous", axis=(1.0, 1.0, 0.0), flip=True),
+]
 TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+
+
+def mesh_of(n: int) -> SourcedMesh:
+    return SourcedMesh(ObjectMesh(np.eye(4, 3) * (n + 1) / 8, TETRAHEDRON), MESH_FILE)
 
 
 def act(editor: SessionEditor, sid: str, state: SessionState, action: str, author: str, n: int) -> None:
@@ -133,9 +152,20 @@ def act(editor: SessionEditor, sid: str, state: SessionState, action: str, autho
         editor.undo(sid, author=author)
     elif action == "redo":
         editor.redo(sid, author=author)
-    elif action in ("unclass", "color", "size") and classes:
+    elif action in ("unclass", "color", "size", "class mesh", "symmetry", "keypoints") and classes:
         a_class = classes[n % len(classes)]
-        if action == "color":
+        if action == "class mesh":
+            mesh = mesh_of(n) if n else None
+            editor.change_class(
+                sid, a_class.id, expected_revision=a_class.revision, mesh=mesh, fit_size=None, author=author
+            )
+        elif action == "symmetry":
+            shape = SHAPES[n % len(SHAPES)]
+            editor.change_class(sid, a_class.id, expected_revision=a_class.revision, symmetry=shape, author=author)
+        elif action == "keypoints":
+            points = [Keypoint(f"k{i}", (0.1 * n, -0.5, 1 / 3)) for i in range(n)]
+            editor.change_class(sid, a_class.id, expected_revision=a_class.revision, keypoints=points, author=author)
+        elif action == "color":
             editor.change_class(sid, a_class.id, expected_revision=a_class.revision, color=f"#00000{n}", author=author)
         elif action == "size":
             size = (0.1 * n, 0.2, 0.3) if n else None
@@ -148,6 +178,9 @@ def act(editor: SessionEditor, sid: str, state: SessionState, action: str, autho
             editor.delete_box(sid, box.id, expected_revision=box.revision, author=author)
         elif action == "duplicate":
             editor.duplicate_box(sid, box.id, author=author)
+        elif action == "mesh":
+            mesh = mesh_of(n) if n else None
+            editor.change_box(sid, box.id, expected_revision=box.revision, mesh=mesh, author=author)
         elif action == "lock":
             editor.change_box(sid, box.id, expected_revision=box.revision, locked=not box.locked, author=author)
         elif action == "move":

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Int, UInt8
 
 from ars_web.datasets.writers import yolo
 from ars_web.datasets.writers.joining import join_files
@@ -17,8 +18,15 @@ from ars_web.datasets.writers.writer import Dataset, FileDigests, Shard, Writer
 
 def _write(shard: Shard, files: Path, fragments: Path) -> FileDigests:
     buffer, starts = yolo.rows(shard.table.bbox, shard.keep, shard.sizes, shard.class_of_box)
+    return write_rows(shard, buffer, starts, files, fragments)
+
+
+def write_rows(
+    shard: Shard, rows: UInt8[np.ndarray, "size"], starts: Int[np.ndarray, "k"], files: Path, fragments: Path
+) -> FileDigests:
+    """The files of a shard whose rows lie in one buffer, those of frame i from `starts[i]` to `starts[i + 1]`."""
     names = [f"{stem}.txt" for stem in shard.stems]
-    digests = write_files(files, ["labels"] * len(names), names, buffer.data, starts)
+    digests = write_files(files, ["labels"] * len(names), names, rows.data, starts)
     identities = [f"{identity}\n".encode() for identity in shard.identities]
     id_starts = np.cumsum([0, *map(len, identities)])
     write_files(files, ["ids"] * len(names), names, memoryview(b"".join(identities)), id_starts)
@@ -28,7 +36,8 @@ def _write(shard: Shard, files: Path, fragments: Path) -> FileDigests:
     return digests
 
 
-def _join(dataset: Dataset, fragments: Sequence[Path], folder: Path) -> FileDigests:
+def write_layout(dataset: Dataset, fragments: Sequence[Path], folder: Path) -> FileDigests:
+    """The folders, and the list of each split."""
     for name in ("images", "labels", "ids"):
         (folder / name).mkdir(parents=True, exist_ok=True)
     for split in dataset.splits:
@@ -45,7 +54,7 @@ WRITER = Writer(
     label_folder="labels",
     image_folder=lambda split: "images",
     write=_write,
-    join=_join,
+    join=write_layout,
     numbered=True,
     only_jpeg=True,
 )

@@ -2,7 +2,8 @@
 
 Image ids and category ids start at 1, as COCO's own tools expect; an annotation's id follows from its image and its
 box, so that shards can write final bytes. `bbox` is top left x, y, width, height of the part in the image,
-`segmentation` its outline and `area` the outline's. Beyond COCO: `amodal_bbox` of the whole object, unclipped,
+`segmentation` its outline and `area` the outline's. `keypoints` are pixel indices, as COCO's own are: 0.5 less than the
+coordinates of `bbox` and `segmentation`, which are edges. Beyond COCO: `amodal_bbox` of the whole object, unclipped,
 `visible` and `truncated`.
 """
 
@@ -14,10 +15,14 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 from numba import njit
 
+from ars_web.datasets.label_functions import Marks
+from ars_web.datasets.planned import PlannedClass
 from ars_web.datasets.samples import LabelTable, Outlines
 from ars_web.datasets.writers.digits import Buffer, put_bytes, put_decimal, put_integer, scaled
 from ars_web.datasets.writers.joining import Joined
 from ars_web.datasets.writers.writer import Dataset, FileDigests, Shard, Writer
+from ars_web.geometry.box import EDGES
+from ars_web.geometry.keypoints import DEFAULT_KEYPOINTS
 
 
 def _text(text: str) -> UInt8[np.ndarray, "size"]:
@@ -30,15 +35,20 @@ _CATEGORY = _text(',"category_id":')
 _BBOX = _text(',"bbox":[')
 _AREA = _text('],"area":')
 _SEGMENTATION = _text(',"iscrowd":0,"segmentation":[[')
-_AMODAL = _text(']],"amodal_bbox":[')
+_KEYPOINTS = _text(']],"keypoints":[')
+_COUNT = _text('],"num_keypoints":')
+_AMODAL = _text(',"amodal_bbox":[')
 _VISIBLE = _text('],"visible":')
 _TRUNCATED = _text(',"truncated":')
 
 _FIXED_BYTES = 512
-"""More than the longest annotation without its ring."""
+"""More than the longest annotation without its ring and its keypoints."""
 
 _POINT_BYTES = 2 * 13
 """An image of 100 million pixels in one row: nine digits, a point, two decimals and a comma, twice."""
+
+_KEYPOINT_BYTES = _POINT_BYTES + 2
+"""Then a digit and a comma."""
 
 
 def annotations(
@@ -46,6 +56,8 @@ def annotations(
     keep: Bool[np.ndarray, "n b"],
     outlines: Outlines,
     class_of_box: Int[np.ndarray, "b"],
+    marks: Marks,
+    keypoints_of_box: Int[np.ndarray, "b"],
     *,
     first: int,
     most_boxes: int,
@@ -54,10 +66,14 @@ def annotations(
 
     `first` is the place of the first frame in the dataset: image ids are places + 1, annotation ids are
     place * most_boxes + box + 1. Coordinates and areas have two decimals, shares four, rounded halves up;
-    `x + width` is exactly the rounded right edge. A label without an outline has its box for one.
+    `x + width` is exactly the rounded right edge. A label without an outline has its box for one. Of a box's points
+    in `marks` the first `keypoints_of_box` are written.
     """
-    points = int(keep.sum()) * 4 + len(outlines.points)
-    buffer = np.empty(int(keep.sum()) * _FIXED_BYTES + points * _POINT_BYTES, dtype=np.uint8)
+    kept = int(keep.sum())
+    points = kept * 4 + len(outlines.points)
+    keypoints = int((keep * keypoints_of_box).sum())
+    size = kept * _FIXED_BYTES + points * _POINT_BYTES + keypoints * _KEYPOINT_BYTES
+    buffer = np.empty(size, dtype=np.uint8)
     end = _annotations(
         table.bbox,
         table.bbox_amodal,
@@ -67,6 +83,9 @@ def annotations(
         outlines.points,
         outlines.starts,
         class_of_box.astype(np.int64),
+        marks.points,
+        marks.states.astype(np.int64),
+        keypoints_of_box.astype(np.int64),
         first,
         most_boxes,
         buffer,
@@ -84,6 +103,9 @@ def _annotations(
     points: Float[np.ndarray, "m 2"],
     starts: Int[np.ndarray, "k"],
     class_of_box: Int[np.ndarray, "b"],
+    keypoints: Float[np.ndarray, "n b k 2"],
+    states: Int[np.ndarray, "n b k"],
+    keypoints_of_box: Int[np.ndarray, "b"],
     first: int,
     most_boxes: int,
     buffer: Buffer,
@@ -118,6 +140,11 @@ def _annotations(
                 place = put_decimal(buffer, place, scaled(ring[i, 0], 100.0), 2)
                 buffer[place] = 44
                 place = put_decimal(buffer, place + 1, scaled(ring[i, 1], 100.0), 2)
+            place = put_bytes(buffer, place, _KEYPOINTS)
+            count = keypoints_of_box[box]
+            place, labelled = _put_keypoints(buffer, place, keypoints[frame, box, :count], states[frame, box, :count])
+            place = put_bytes(buffer, place, _COUNT)
+            place = put_integer(buffer, place, labelled)
             place = put_bytes(buffer, place, _AMODAL)
             place = _put_bbox(buffer, place, amodal[frame, box])
             place = put_bytes(buffer, place, _VISIBLE)
@@ -138,6 +165,29 @@ def _put_bbox(buffer: Buffer, place: int, bbox: Float[np.ndarray, "4"]) -> int:
         buffer[place] = 44
         place = put_decimal(buffer, place + 1, value, 2)
     return place
+
+
+@njit(cache=True)
+def _put_keypoints(
+    buffer: Buffer, place: int, points: Float[np.ndarray, "k 2"], states: Int[np.ndarray, "k"]
+) -> tuple[int, int]:
+    """`x,y,v` of each point, as pixel indices, zeros where it is not labelled; with the count of those that are."""
+    labelled = 0
+    for i in range(len(states)):
+        x, y = 0, 0
+        if states[i] > 0:
+            labelled += 1
+            # A pixel's index is its centre's coordinate less a half.
+            x, y = scaled(points[i, 0] - 0.5, 100.0), scaled(points[i, 1] - 0.5, 100.0)
+        if i > 0:
+            buffer[place] = 44
+            place += 1
+        place = put_decimal(buffer, place, x, 2)
+        buffer[place] = 44
+        place = put_decimal(buffer, place + 1, y, 2)
+        buffer[place] = 44
+        place = put_integer(buffer, place + 1, states[i])
+    return place, labelled
 
 
 @njit(cache=True)
@@ -163,6 +213,7 @@ def _area(ring: Float[np.ndarray, "k 2"]) -> float:
 
 def _write(shard: Shard, files: Path, fragments: Path) -> FileDigests:
     of_frame = np.array(shard.splits)
+    counts = [len(shard.classes[place].keypoints) for place in shard.class_of_box.tolist()]
     for split in sorted(set(shard.splits)):
         in_split = of_frame == split
         images = [
@@ -179,6 +230,8 @@ def _write(shard: Shard, files: Path, fragments: Path) -> FileDigests:
             shard.keep & in_split[:, None],
             shard.outlines,
             shard.class_of_box,
+            shard.marks["keypoints"],
+            np.array(counts, dtype=np.int64),
             first=shard.first,
             most_boxes=shard.most_boxes,
         )
@@ -189,7 +242,16 @@ def _write(shard: Shard, files: Path, fragments: Path) -> FileDigests:
 def _join(dataset: Dataset, fragments: Sequence[Path], folder: Path) -> FileDigests:
     (folder / "images").mkdir(parents=True, exist_ok=True)
     (folder / "annotations").mkdir(parents=True, exist_ok=True)
-    categories = [{"id": i, "name": name, "supercategory": ""} for i, name in enumerate(dataset.class_names, start=1)]
+    categories = [
+        {
+            "id": i,
+            "name": a_class.name,
+            "supercategory": "",
+            "keypoints": [point.name for point in a_class.keypoints],
+            "skeleton": _skeleton(a_class),
+        }
+        for i, a_class in enumerate(dataset.classes, start=1)
+    ]
     digests: FileDigests = {}
     for split in dataset.splits:
         path = f"annotations/instances_{split}.json"
@@ -205,17 +267,27 @@ def _join(dataset: Dataset, fragments: Sequence[Path], folder: Path) -> FileDige
     return digests
 
 
+def _skeleton(a_class: PlannedClass) -> list[list[int]]:
+    """Which keypoints, counted from 1, are joined by a line: the box's edges, where they are its corners."""
+    if a_class.keypoints != DEFAULT_KEYPOINTS:
+        return []
+    # The first keypoint is the centre.
+    return (EDGES + 2).tolist()
+
+
 WRITER = Writer(
     format="coco",
-    title="COCO instances",
+    title="COCO instances and keypoints",
     description=(
-        "For Detectron2, MMDetection and most others: one JSON file a split, with boxes, outlines as "
-        "polygons, the whole object's box, and how much of it is seen and cut off."
+        "For Detectron2, MMDetection and most others: one JSON file a split, with boxes, outlines as polygons,"
+        " keypoints, the whole object's box, and how much of it is seen and cut off."
     ),
     label_folder="annotations",
     image_folder=lambda split: "images",
     write=_write,
     join=_join,
+    shows=("outline", "box", "keypoints"),
+    label_functions=("keypoints",),
     with_visible=True,
     with_outlines=True,
 )

@@ -7,13 +7,13 @@ Boxes are 1-based and inclusive: pixel columns and rows whose larger part lies i
 
 from collections.abc import Sequence
 from pathlib import Path
-from xml.sax.saxutils import escape
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ars_web.datasets.writers.joining import join_files
 from ars_web.datasets.writers.small_files import write_files
+from ars_web.datasets.writers.texts import xml_text
 from ars_web.datasets.writers.writer import Dataset, FileDigests, Shard, Writer
 
 TRUNCATED_BEYOND = 0.15
@@ -32,12 +32,6 @@ def inclusive(bbox: Float[np.ndarray, "n b 4"], sizes: Int[np.ndarray, "n 2"]) -
     low = np.clip(edges[..., :2] + 1, 1, last)
     high = np.clip(edges[..., 2:], low, last)
     return np.concatenate([low, high], axis=-1)
-
-
-def _xml(text: str) -> str:
-    """`text` as XML content; XML has no way to write control characters, so they become `_`."""
-    printable = (character if character.isprintable() else "_" for character in text)
-    return escape("".join(printable))
 
 
 def _annotation(
@@ -64,7 +58,7 @@ def _annotation(
 def _write(shard: Shard, files: Path, fragments: Path) -> FileDigests:
     boxes = inclusive(shard.table.bbox, shard.sizes)
     flags = _flags(shard.table.truncated, shard.table.visible)
-    class_names = [_xml(shard.class_names[int(i)]) for i in shard.class_of_box.tolist()]
+    class_names = [xml_text(shard.class_names[int(i)]) for i in shard.class_of_box.tolist()]
     contents = [
         _annotation(
             image,

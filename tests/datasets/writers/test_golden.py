@@ -6,6 +6,7 @@ Where a format changes on purpose, write the files anew from the folder that the
 from collections.abc import Callable
 from pathlib import Path
 
+import cv2
 import pytest
 
 from ars_web import __version__
@@ -25,8 +26,24 @@ def test_files_are_the_golden_ones(make_snapshot: Callable[..., SessionSnapshot]
     snapshot = make_snapshot(12, classes=("cube", 'a "tall" & <odd> one: #1'))
     out = tmp_path / kind
     run_export(plan_export([snapshot], format=kind, options=options, out=out, frames_per_shard=2))
-    found = {str(p.relative_to(out)): p.read_text() for p in sorted(out.rglob("*")) if p.is_file()}
+    found = _contents(out)
     # The version is the one thing in it that changes by itself.
     found["dataset.json"] = found["dataset.json"].replace(f'"version": "{__version__}"', '"version": "VERSION"')
     golden = GOLDEN / kind
-    assert found == {str(p.relative_to(golden)): p.read_text() for p in sorted(golden.rglob("*")) if p.is_file()}
+    assert found == _contents(golden)
+
+
+def _contents(folder: Path) -> dict[str, str]:
+    """Every file's text by its path; of images the pixels, which encoders may pack as they like; of other files that
+    are no text, the bytes in Python's notation."""
+    found: dict[str, str] = {}
+    for path in sorted(path for path in folder.rglob("*") if path.is_file()):
+        content = path.read_bytes()
+        if path.suffix == ".png":
+            found[str(path.relative_to(folder))] = repr(cv2.imread(str(path), cv2.IMREAD_UNCHANGED).tolist())
+            continue
+        try:
+            found[str(path.relative_to(folder))] = content.decode()
+        except UnicodeDecodeError:
+            found[str(path.relative_to(folder))] = repr(content)
+    return found

@@ -1,0 +1,1 @@
+"""Datasets read back as their users would, and compared with the session they were made from."""
