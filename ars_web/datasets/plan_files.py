@@ -1,7 +1,7 @@
 """An export's plan on disk, in the partial folder: all that a worker needs, without a database.
 
-`plan.json` holds names and numbers, `arrays.npz` the columns, `digest` the plan's SHA-256. The digest is written
-last: a folder without it holds no whole plan.
+`plan.json` and `arrays.npz` hold what grows with the sessions, `columns/` what grows with their frames
+(`plan_columns`), `digest` the plan's SHA-256. The digest is written last: a folder without it holds no whole plan.
 """
 
 import hashlib
@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ars_web.datasets import plan_columns
 from ars_web.datasets.options import ExportOptions
 from ars_web.datasets.planned import ExportPlan, PlannedClass, PlannedFrames, PlannedSession
 from ars_web.geometry.box import Box, stack
@@ -22,16 +23,17 @@ from ars_web.geometry.keypoints import Keypoint
 from ars_web.geometry.mesh import Mesh
 from ars_web.geometry.symmetry import Symmetry
 
-_VERSION = 2
+_VERSION = 3
 """Of these files and of what a shard's folder holds; another version's partial folder is not resumed."""
 
-_COLUMNS = ("session", "index", "camera_id", "split", "Ts_world_camera", "stamps")
+FILES = ("plan.json", "arrays.npz", *plan_columns.FILES)
+"""Of a plan, all but its digest."""
 
 
 def digest_of(plan: ExportPlan) -> str:
     """The plan's SHA-256 in hex: over everything but where `out` is, so equal digests mean equal datasets."""
     digest = hashlib.sha256(_document(plan))
-    for name, array in sorted(_arrays(plan).items()):
+    for name, array in sorted((_arrays(plan) | _columns(plan)).items()):
         digest.update(f"{name} {array.dtype.str} {array.shape}\n".encode())
         digest.update(np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()
@@ -40,6 +42,7 @@ def digest_of(plan: ExportPlan) -> str:
 def write_plan(plan: ExportPlan, folder: Path) -> None:
     """Write the plan into the folder, on the disk when this returns."""
     _write_synced(folder / "plan.json", _document(plan))
+    plan_columns.write_columns(_columns(plan), folder)
     with (folder / "arrays.npz").open("wb") as file:
         np.savez(file, allow_pickle=False, **_arrays(plan))
         file.flush()
@@ -54,15 +57,15 @@ def read_digest(folder: Path) -> str | None:
 
 
 def read_plan(folder: Path, *, out: Path) -> ExportPlan:
-    """The plan in the folder, for the dataset at `out`."""
+    """The plan in the folder, for the dataset at `out`; its frames' columns stay there until they are looked at."""
     document: dict[str, Any] = json.loads((folder / "plan.json").read_bytes())
     with np.load(folder / "arrays.npz", allow_pickle=False) as arrays:
-        columns = {name: arrays[name] for name in _COLUMNS}
         boxes = [
             tuple(Box(T, size) for T, size in zip(arrays[f"Ts_world_box_{i}"], arrays[f"sizes_{i}"], strict=True))
             for i in range(len(document["sessions"]))
         ]
         meshes = [_meshes(arrays, i, len(boxes[i])) for i in range(len(boxes))]
+    numbers, texts = plan_columns.read_columns(folder)
     sessions = tuple(
         PlannedSession(
             id=session["id"],
@@ -84,12 +87,7 @@ def read_plan(folder: Path, *, out: Path) -> ExportPlan:
         options=ExportOptions.model_validate(document["options"]),
         classes=tuple(_class(values) for values in document["classes"]),
         sessions=sessions,
-        frames=PlannedFrames(
-            **columns,
-            names=tuple(document["names"]),
-            stems=tuple(document["stems"]),
-            sources=tuple(document["sources"]),
-        ),
+        frames=PlannedFrames(**numbers, names=texts["names"], stems=texts["stems"], sources=texts["sources"]),
         shards=tuple((start, stop) for start, stop in document["shards"]),
     )
 
@@ -114,16 +112,20 @@ def _document(plan: ExportPlan) -> bytes:
                 }
                 for s in plan.sessions
             ],
-            "names": plan.frames.names,
-            "stems": plan.frames.stems,
-            "sources": plan.frames.sources,
             "shards": plan.shards,
         }
     ).encode()
 
 
+def _columns(plan: ExportPlan) -> dict[str, np.ndarray]:
+    columns = {name: np.asarray(getattr(plan.frames, name)) for name in plan_columns.NUMBERS}
+    for name in plan_columns.TEXTS:
+        columns[name], columns[f"{name}_ends"] = plan_columns.text_arrays(getattr(plan.frames, name))
+    return columns
+
+
 def _arrays(plan: ExportPlan) -> dict[str, np.ndarray]:
-    arrays = {name: np.asarray(getattr(plan.frames, name)) for name in _COLUMNS}
+    arrays: dict[str, np.ndarray] = {}
     for number, session in enumerate(plan.sessions):
         Ts, sizes = stack(list(session.boxes))
         arrays |= {f"Ts_world_box_{number}": Ts, f"sizes_{number}": sizes}

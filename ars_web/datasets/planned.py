@@ -1,5 +1,6 @@
 """What a plan of an export holds; `plan.py` decides it, `plan_files.py` keeps it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -86,9 +87,9 @@ class PlannedFrames:
     split: Int[np.ndarray, "n"]
     Ts_world_camera: Float[np.ndarray, "n 4 4"]
     stamps: Int[np.ndarray, "n 2"]
-    names: tuple[str, ...]
-    stems: tuple[str, ...]
-    sources: tuple[str, ...]
+    names: Sequence[str]
+    stems: Sequence[str]
+    sources: Sequence[str]
 
     def __len__(self) -> int:
         return len(self.names)

@@ -21,6 +21,7 @@ from ars_web.datasets.assembly import DOCUMENT, description_of
 from ars_web.datasets.jobs import SHOWN_IMAGES, local_executor
 from ars_web.datasets.options import ExportOptions
 from ars_web.datasets.plan import plan_export
+from ars_web.datasets.plan_files import FILES as PLAN_FILES
 from ars_web.datasets.plan_files import digest_of, write_plan
 from ars_web.datasets.planned import ExportPlan
 from ars_web.datasets.registry import writer_of
@@ -30,7 +31,6 @@ from ars_web.datasets.store_worker import (
     BEGUN,
     FILES,
     FRAGMENTS,
-    PLAN,
     REPORT,
     cancel_name,
     export_stored_shard,
@@ -134,7 +134,7 @@ class _StoreKeeper:
                 raise BadInput(f"{self.target} is not empty; name a folder that is not there yet, or empty it")
             with TemporaryDirectory(prefix="ars-web-plan-") as folder:
                 write_plan(self.plan, Path(folder))
-                self.partial.upload([(Path(folder) / name, name) for name in PLAN])
+                self.partial.upload([(Path(folder) / name, name) for name in PLAN_FILES])
                 # Last: with it, the plan is whole.
                 self.partial.upload([(Path(folder) / _DIGEST, _DIGEST)])
         self.partial.write(_OWNER, self.run.encode())

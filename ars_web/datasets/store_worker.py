@@ -13,6 +13,7 @@ from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from ars_web.datasets.plan_files import FILES as PLAN_FILES
 from ars_web.datasets.plan_files import read_plan
 from ars_web.datasets.planned import ExportPlan
 from ars_web.datasets.worker import fill_shard, watch
@@ -22,7 +23,6 @@ REPORT = "shard.json"
 FILES = "files"
 FRAGMENTS = "fragments"
 BEGUN = "begun-"
-PLAN = ("plan.json", "arrays.npz")
 
 _LOOK_EVERY = 1.0
 """Seconds between looks whether to stop; each is a request."""
@@ -82,5 +82,6 @@ def files_below(folder: Path) -> list[tuple[Path, str]]:
 def _plan(target: str, digest: str) -> ExportPlan:
     """The plan, read once a process; the digest is in the key because another plan may take its place."""
     with TemporaryDirectory(prefix="ars-web-plan-") as folder:
-        partial_of(store_folder(target)).download(PLAN, Path(folder))
+        partial_of(store_folder(target)).download(PLAN_FILES, Path(folder))
+        # What is mapped of it stays for as long as it is used.
         return read_plan(Path(folder), out=Path(folder))
