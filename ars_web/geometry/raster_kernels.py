@@ -519,16 +519,14 @@ def draw_shape(
 ) -> None:
     """Raise the inverse depths `drawn` of a grid's rays to those at which they meet a shape, as box labels have it: it
     is cut off at the near plane, and closed there; from within it, its far side is met."""
-    kind = placed.kinds[b]
-    if kind == OUTSIDE:
-        draw(shapes, placed, b, 1.0, near, grid, xs, ys, drawn)
-    elif kind == ROUND:
-        draw(shapes, placed, b, 0.0, near, grid, xs, ys, drawn)
-    else:
-        n = grid.rows * grid.columns
+    kind, n = placed.kinds[b], grid.rows * grid.columns
+    front, back = drawn, drawn
+    if kind == CUT:
         front, back = np.zeros(n), np.zeros(n)
-        draw(shapes, placed, b, 1.0, near, grid, xs, ys, front)
-        draw(shapes, placed, b, -1.0, near, grid, xs, ys, back)
+    for second in range(2 if kind == CUT else 1):
+        side = 0.0 if kind == ROUND else (-1.0 if second else 1.0)
+        draw(shapes, placed, b, side, near, grid, xs, ys, back if second else front)
+    if kind == CUT:
         for ray in range(n):
             # What is left before it is entered was entered nearer than the near plane.
             met = front[ray] if back[ray] <= front[ray] * NEARER else 1.0 / near
@@ -651,19 +649,16 @@ def visible_shares(
                 if by_depth:
                     cast_grid(rays, spacing, u0, v0, du, dv, rows, columns, xs, ys)
                     own[:size], other[:size] = 0.0, 0.0
-                    draw_shape(shapes, placed, b, near, grid, xs, ys, own)
-                if ends[b] > starts[b]:
-                    cover(pieces[starts[b] : ends[b]], grid, turns, seen)
-                else:
+                for k in range(n + 1):
+                    c = others[k] if k < n else b
+                    if ends[c] > starts[c] and (k == n or parted[k]):
+                        cover(pieces[starts[c] : ends[c]], grid, turns, hidden if k < n else seen)
+                    # A shape round the camera hides nothing: what it stands for is no solid block where the camera is.
+                    if by_depth and (k == n or (not parted[k] and placed.kinds[c] != ROUND)):
+                        draw_shape(shapes, placed, c, near, grid, xs, ys, other if k < n else own)
+                if ends[b] == starts[b]:
                     for ray in range(size):
                         seen[ray] = own[ray] > 0.0
-                for k in range(n):
-                    c = others[k]
-                    # A shape round the camera hides nothing: what it stands for is no solid block where the camera is.
-                    if parted[k]:
-                        cover(pieces[starts[c] : ends[c]], grid, turns, hidden)
-                    elif placed.kinds[c] != ROUND:
-                        draw_shape(shapes, placed, c, near, grid, xs, ys, other)
                 met, left = 0, 0
                 for ray in range(size):
                     if by_depth:
