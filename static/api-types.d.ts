@@ -495,6 +495,49 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/sessions/{sid}/labels/import": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Import Labels
+         * @description Add the labels of a file below a declared root, in one edit; what does not come in is told, counted by reason.
+         *
+         *     Posed objects that rest become boxes; outlines become masks, and the box of their hull; rectangles in three frames
+         *     or more become the box that fits them. A file that is damaged, or about other images, is refused as a whole.
+         */
+        post: operations["labels-import"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/labels/upload": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Upload
+         * @description Add the labels of a file that is sent, or of a zip, as `import` does. The file is not kept.
+         */
+        post: operations["labels-upload"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/sessions/{sid}/points": {
         parameters: {
             query?: never;
@@ -694,6 +737,103 @@ export interface paths {
          *     A box that is there must be at the revision in `If-Match`; an object that has masks and no box yet needs none.
          */
         put: operations["boxes-make-hull"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/classes/{class_id}/mesh": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Put Class Mesh
+         * @description Give a class, which is at the revision in `If-Match`, the mesh of its objects, or another one.
+         *
+         *     It takes up to 200,000 faces. What its numbers mean is asked for and never guessed. It moves and turns with each
+         *     box of the class and does not scale with it.
+         */
+        put: operations["classes-put-mesh"];
+        post?: never;
+        /**
+         * Delete Class Mesh
+         * @description Take its mesh from a class that is at the revision in `If-Match`; undo brings it back.
+         */
+        delete: operations["classes-delete-mesh"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/boxes/{box_id}/mesh": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Box Mesh
+         * @description The mesh that the object in a box has: its own, else its class's. The ETag is the box's.
+         */
+        get: operations["boxes-mesh"];
+        /**
+         * Put Box Mesh
+         * @description Give the object in a box, which is at the revision in `If-Match`, a mesh of its own, which counts before its
+         *     class's; a locked box answers 409 (`locked`).
+         */
+        put: operations["boxes-put-mesh"];
+        post?: never;
+        /**
+         * Delete Box Mesh
+         * @description Take its own mesh, or polygon, from a box that is at the revision in `If-Match`: its class's counts again.
+         */
+        delete: operations["boxes-delete-mesh"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/boxes/{box_id}/polygon": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Put Polygon
+         * @description Have the object in a box, which is at the revision in `If-Match`, be a planar polygon: a mesh of its own that is
+         *     seen from both sides. Corners a little off their plane are moved into it.
+         */
+        put: operations["boxes-put-polygon"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/meshes/{digest}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get
+         * @description A mesh that a class or a box has, or had.
+         */
+        get: operations["meshes-get"];
+        put?: never;
         post?: never;
         delete?: never;
         options?: never;
@@ -1168,7 +1308,7 @@ export interface paths {
         };
         /**
          * Formats
-         * @description The formats of recordings and of datasets, with the options of exports in words.
+         * @description The formats of recordings, labels and datasets, with the options of exports in words.
          */
         get: operations["formats-list"];
         put?: never;
@@ -1235,6 +1375,11 @@ export interface components {
             has_hull: boolean;
             /** @description how it was made from its masks; null: it was not */
             hull_options: components["schemas"]["HullOptionsJson"] | null;
+            /**
+             * Has Mesh
+             * @description whether a mesh of its own is stored with it; it counts before its class's
+             */
+            has_mesh: boolean;
             /**
              * Locked
              * @description class, place and size stay, and it is not deleted, until it is unlocked
@@ -1324,6 +1469,11 @@ export interface components {
             /** @description how it was made from its masks; null: it was not */
             hull_options: components["schemas"]["HullOptionsJson"] | null;
             /**
+             * Has Mesh
+             * @description whether a mesh of its own is stored with it; it counts before its class's
+             */
+            has_mesh: boolean;
+            /**
              * Locked
              * @description class, place and size stay, and it is not deleted, until it is unlocked
              */
@@ -1368,6 +1518,60 @@ export interface components {
              * @default false
              */
             locked: boolean;
+        };
+        /**
+         * BoxMeshAnswer
+         * @description A box that was given a mesh.
+         */
+        BoxMeshAnswer: {
+            /**
+             * Id
+             * @description never used again
+             */
+            id: number;
+            /** Class Id */
+            class_id: number;
+            /** Name */
+            name: string;
+            /** @description the box's centre and axes in the world */
+            T_world_box: components["schemas"]["TransformAnswer"];
+            /**
+             * Size
+             * @description metres along the box's own axes
+             */
+            size: [
+                number,
+                number,
+                number
+            ];
+            /**
+             * Has Hull
+             * @description whether a visual hull is stored with it
+             */
+            has_hull: boolean;
+            /** @description how it was made from its masks; null: it was not */
+            hull_options: components["schemas"]["HullOptionsJson"] | null;
+            /**
+             * Has Mesh
+             * @description whether a mesh of its own is stored with it; it counts before its class's
+             */
+            has_mesh: boolean;
+            /**
+             * Locked
+             * @description class, place and size stay, and it is not deleted, until it is unlocked
+             */
+            locked: boolean;
+            /**
+             * Revision
+             * @description the session's revision that last changed it
+             */
+            revision: number;
+            mesh: components["schemas"]["MeshJson"];
+            /**
+             * Notes
+             * @description what was changed of the mesh, in words
+             */
+            notes: string[];
         };
         /**
          * BoxPatchJson
@@ -1506,6 +1710,15 @@ export interface components {
                 number,
                 number
             ] | null;
+            /** @description of its objects, in their boxes' frames */
+            symmetry: components["schemas"]["SymmetryAnswer"];
+            /**
+             * Keypoints
+             * @description of its objects; none: the box's centre and corners
+             */
+            keypoints: components["schemas"]["KeypointAnswer"][];
+            /** @description of its objects; null: none. Edits have its `digest` alone */
+            mesh: components["schemas"]["MeshJson"] | null;
             /**
              * Revision
              * @description the session's revision that last changed it
@@ -1535,6 +1748,52 @@ export interface components {
             ] | null;
         };
         /**
+         * ClassMeshAnswer
+         * @description A class that was given a mesh.
+         */
+        ClassMeshAnswer: {
+            /**
+             * Id
+             * @description never shifts, never used again
+             */
+            id: number;
+            /** Name */
+            name: string;
+            /**
+             * Color
+             * @description #rrggbb
+             */
+            color: string;
+            /**
+             * Default Size
+             * @description metres, of new boxes of this class; null: not set
+             */
+            default_size: [
+                number,
+                number,
+                number
+            ] | null;
+            /** @description of its objects, in their boxes' frames */
+            symmetry: components["schemas"]["SymmetryAnswer"];
+            /**
+             * Keypoints
+             * @description of its objects; none: the box's centre and corners
+             */
+            keypoints: components["schemas"]["KeypointAnswer"][];
+            /** @description of its objects; null: none. Edits have its `digest` alone */
+            mesh: components["schemas"]["MeshJson"] | null;
+            /**
+             * Revision
+             * @description the session's revision that last changed it
+             */
+            revision: number;
+            /**
+             * Notes
+             * @description what was changed of the mesh, in words
+             */
+            notes: string[];
+        };
+        /**
          * ClassPatch
          * @description What of a class can be changed; what is absent stays.
          */
@@ -1552,6 +1811,13 @@ export interface components {
                 number,
                 number
             ] | null;
+            /** @description of its objects; null: none any more */
+            symmetry?: components["schemas"]["SymmetryJson"] | null;
+            /**
+             * Keypoints
+             * @description null or none: the box's centre and corners
+             */
+            keypoints?: components["schemas"]["KeypointJson"][] | null;
         };
         /**
          * ClassUsed
@@ -1572,14 +1838,14 @@ export interface components {
              * Polygons
              * @description empty: nothing yet
              */
-            polygons: components["schemas"]["PolygonJson"][];
+            polygons: components["schemas"]["ars_web__masks__masks_json__PolygonJson"][];
             /**
              * Operation
              * @enum {string}
              */
             operation: "add" | "subtract";
             /** @description the shape; may cross itself */
-            polygon?: components["schemas"]["PolygonJson"] | null;
+            polygon?: components["schemas"]["ars_web__masks__masks_json__PolygonJson"] | null;
             /** @description or what a brush covers */
             stroke?: components["schemas"]["StrokeJson"] | null;
             /**
@@ -1668,7 +1934,7 @@ export interface components {
              * Format
              * @enum {string}
              */
-            format: "yolo" | "coco" | "voc" | "ars";
+            format: "yolo" | "yolo-seg" | "yolo-obb" | "yolo-pose" | "coco" | "voc" | "kitti" | "bop" | "dope" | "cvat" | "cvat-polygons" | "cvat-video" | "parquet" | "masks" | "compass" | "ars";
             /**
              * @default {
              *       "frames": {
@@ -1676,9 +1942,11 @@ export interface components {
              *         "step": 1
              *       },
              *       "images": "link",
+             *       "masks": "write",
              *       "min_visible": 0,
              *       "max_truncated": 1,
              *       "min_area_px": 4,
+             *       "heading_bins": 18,
              *       "split": {
              *         "by": "block",
              *         "seed": 0,
@@ -1770,6 +2038,13 @@ export interface components {
              */
             shape?: ("box" | "hull" | "mesh") | null;
             /**
+             * Masks
+             * @description of formats that hold each label's pixels as images, which BOP scenes do
+             * @default write
+             * @enum {string}
+             */
+            masks: "write" | "none";
+            /**
              * Smallest visible share
              * @description labels of which less than this is visible, nearer boxes hiding the rest, are dropped; 0 keeps all
              * @default 0
@@ -1787,6 +2062,12 @@ export interface components {
              * @default 4
              */
             min_area_px: number;
+            /**
+             * Bins of a heading
+             * @description how many bins a turn has where headings are part of the class; 0 writes them as angles
+             * @default 18
+             */
+            heading_bins: number;
             /**
              * @default {
              *       "train": 0.8,
@@ -1958,6 +2239,11 @@ export interface components {
         FormatsJson: {
             /** Readers */
             readers: components["schemas"]["ReaderJson"][];
+            /**
+             * Labels
+             * @description that labels beside a recording come in
+             */
+            labels: components["schemas"]["ReaderJson"][];
             /** Writers */
             writers: components["schemas"]["WriterJson"][];
             /** Label Functions */
@@ -2261,7 +2547,7 @@ export interface components {
              * @default auto
              * @enum {string}
              */
-            format: "auto" | "ars" | "roars" | "tum" | "colmap" | "nerfstudio" | "poses";
+            format: "auto" | "ars" | "roars" | "tum" | "colmap" | "nerfstudio" | "bop" | "poses";
             /**
              * Images
              * @description the image folder, where the format implies none; as path
@@ -2326,6 +2612,121 @@ export interface components {
              * Format: date-time
              */
             created: string;
+        };
+        /**
+         * ImportedLabelsJson
+         * @description What came of a file of labels.
+         */
+        ImportedLabelsJson: {
+            /**
+             * Format
+             * @description that it was read as
+             */
+            format: string;
+            /**
+             * Revision
+             * @description the session's, that it made; null: nothing was stored
+             */
+            revision: number | null;
+            /** Boxes */
+            boxes: number;
+            /** Masks */
+            masks: number;
+            /**
+             * Classes
+             * @description that are new in the session
+             */
+            classes: string[];
+            /** Objects */
+            objects: components["schemas"]["ImportedObjectJson"][];
+            /**
+             * Left Out
+             * @description the most frequent reason first
+             */
+            left_out: components["schemas"]["LeftOutJson"][];
+            /**
+             * Notes
+             * @description how the file was understood, where that could be otherwise
+             */
+            notes: string[];
+        };
+        /**
+         * ImportedObjectJson
+         * @description An object that came in, or would.
+         */
+        ImportedObjectJson: {
+            /** Class Name */
+            class_name: string;
+            /**
+             * Box Id
+             * @description of its box, or that is kept for it; null: nothing was stored
+             */
+            box_id: number | null;
+            /**
+             * Name
+             * @description the box's; null: there is none
+             */
+            name: string | null;
+            /** @description null: it has masks only, and `note` says why */
+            T_world_box: components["schemas"]["TransformAnswer"] | null;
+            /**
+             * Size
+             * @description metres
+             */
+            size: [
+                number,
+                number,
+                number
+            ] | null;
+            /**
+             * Made Of
+             * @description what the box was made of
+             */
+            made_of: ("poses" | "outlines" | "rectangles") | null;
+            /**
+             * Masks
+             * @description outlines that came with it
+             */
+            masks: number;
+            /**
+             * Note
+             * @description what to know of it; empty: nothing
+             */
+            note: string;
+        };
+        /**
+         * KeypointAnswer
+         * @description A named point of a class's objects.
+         */
+        KeypointAnswer: {
+            /** Name */
+            name: string;
+            /**
+             * Place
+             * @description in units of the box's sizes, from its centre
+             */
+            place: [
+                number,
+                number,
+                number
+            ];
+        };
+        /**
+         * KeypointJson
+         * @description A named point of an object.
+         */
+        KeypointJson: {
+            /** Name */
+            name: string;
+            /**
+             * Place
+             * @description from the box's centre along its axes, in units of its sizes: a corner is at +-0.5
+             */
+            place: [
+                number,
+                number,
+                number
+            ];
         };
         /**
          * LabelFunctionJson
@@ -2396,6 +2797,35 @@ export interface components {
             visible: number;
         };
         /**
+         * LabelsDraft
+         * @description A file of labels below a declared root.
+         */
+        LabelsDraft: {
+            /**
+             * Format
+             * @description auto: found by looking
+             * @default auto
+             * @enum {string}
+             */
+            format: "auto" | "bop" | "coco" | "cvat";
+            /**
+             * Dry Run
+             * @description say what would come in, and store nothing
+             * @default false
+             */
+            dry_run: boolean;
+            /**
+             * Root
+             * @description a name from GET /api/roots
+             */
+            root: string;
+            /**
+             * Path
+             * @description of a file, or of a folder that holds one; relative, with /
+             */
+            path: string;
+        };
+        /**
          * LabelsPreviewDraft
          * @description Boxes, and the frames to see them in.
          */
@@ -2404,6 +2834,21 @@ export interface components {
             boxes: components["schemas"]["PreviewBoxJson"][];
             /** Frames */
             frames: number[];
+        };
+        /**
+         * LeftOutJson
+         * @description Labels that are left out for one reason.
+         */
+        LeftOutJson: {
+            /** Reason */
+            reason: string;
+            /** Count */
+            count: number;
+            /**
+             * Examples
+             * @description what the file calls the first of them
+             */
+            examples: string[];
         };
         /**
          * Login
@@ -2440,7 +2885,7 @@ export interface components {
              * @default auto
              * @enum {string}
              */
-            format: "auto" | "ars" | "roars" | "tum" | "colmap" | "nerfstudio" | "poses";
+            format: "auto" | "ars" | "roars" | "tum" | "colmap" | "nerfstudio" | "bop" | "poses";
             /**
              * Images
              * @description the image folder, where the format implies none; as path
@@ -2607,6 +3052,11 @@ export interface components {
             /** @description how it was made from its masks; null: it was not */
             hull_options: components["schemas"]["HullOptionsJson"] | null;
             /**
+             * Has Mesh
+             * @description whether a mesh of its own is stored with it; it counts before its class's
+             */
+            has_mesh: boolean;
+            /**
              * Locked
              * @description class, place and size stay, and it is not deleted, until it is unlocked
              */
@@ -2756,7 +3206,7 @@ export interface components {
              * Polygons
              * @description what an odd number of their rings enclose is inside; at most 20000 corners in all
              */
-            polygons?: components["schemas"]["PolygonJson"][] | null;
+            polygons?: components["schemas"]["ars_web__masks__masks_json__PolygonJson"][] | null;
             /**
              * Mask Png
              * @description base64 of an 8-bit greyscale PNG of the image's size, non-zero inside
@@ -2776,7 +3226,7 @@ export interface components {
              * Polygons
              * @description what an odd number of their rings enclose is inside; at most 20000 corners in all
              */
-            polygons?: components["schemas"]["PolygonJson"][] | null;
+            polygons?: components["schemas"]["ars_web__masks__masks_json__PolygonJson"][] | null;
             /**
              * Mask Png
              * @description base64 of an 8-bit greyscale PNG of the image's size, non-zero inside
@@ -2805,6 +3255,100 @@ export interface components {
              * @default true
              */
             accepted: boolean;
+        };
+        /**
+         * MeshJson
+         * @description What there is to say of a mesh; `GET …/meshes/{digest}` has the mesh itself.
+         */
+        MeshJson: {
+            /**
+             * Digest
+             * @description its name: it says what it holds, which never changes
+             */
+            digest: string;
+            /**
+             * Vertices
+             * @description how many
+             */
+            vertices: number;
+            /**
+             * Faces
+             * @description how many
+             */
+            faces: number;
+            /**
+             * Extent
+             * @description metres along the box's axes
+             */
+            extent: [
+                number,
+                number,
+                number
+            ];
+            source: components["schemas"]["MeshSourceJson"];
+        };
+        /**
+         * MeshSourceJson
+         * @description Where a mesh came from.
+         */
+        MeshSourceJson: {
+            /**
+             * Name
+             * @description of its file
+             */
+            name: string;
+            /**
+             * Unit
+             * @enum {string}
+             */
+            unit: "mm" | "cm" | "m" | "in";
+            /**
+             * Axes
+             * @description which axes of the file run along the box's x, y and z
+             */
+            axes: string;
+            /**
+             * Origin
+             * @description what lies at the box's centre: the middle of it, or the file's own origin
+             * @enum {string}
+             */
+            origin: "centre" | "file";
+        };
+        /**
+         * MeshSurface
+         * @description A mesh.
+         */
+        MeshSurface: {
+            /** Digest */
+            digest: string;
+            /**
+             * Vertices
+             * @description metres along the box's axes, from its centre; the mesh does not scale with the box
+             */
+            vertices: [
+                number,
+                number,
+                number
+            ][];
+            /**
+             * Faces
+             * @description rows of `vertices`, counter-clockwise seen from outside
+             */
+            faces: [
+                number,
+                number,
+                number
+            ][];
+            /**
+             * Extent
+             * @description metres along the box's axes
+             */
+            extent: [
+                number,
+                number,
+                number
+            ];
+            source: components["schemas"]["MeshSourceJson"];
         };
         /**
          * NextViewJson
@@ -3113,22 +3657,6 @@ export interface components {
             ][][];
         };
         /**
-         * PolygonJson
-         * @description A ring with its holes; image coordinates of the original image, rings not closed.
-         */
-        PolygonJson: {
-            /** Outer */
-            outer: [
-                number,
-                number
-            ][];
-            /** Holes */
-            holes?: [
-                number,
-                number
-            ][][];
-        };
-        /**
          * PolygonsAnswer
          * @description An outline; empty where nothing is left of it.
          */
@@ -3251,7 +3779,7 @@ export interface components {
         };
         /**
          * ReaderJson
-         * @description A format that recordings come in.
+         * @description A format that recordings or labels come in.
          */
         ReaderJson: {
             /** Format */
@@ -3349,6 +3877,26 @@ export interface components {
             name: string;
         };
         /**
+         * RotationJson
+         * @description A turn that changes nothing about an object, and so do its repeats.
+         */
+        RotationJson: {
+            /**
+             * Axis
+             * @description through the box's centre, along the box's axes; of any length but zero
+             */
+            axis: [
+                number,
+                number,
+                number
+            ];
+            /**
+             * Order
+             * @description it turns by 1 / order of a circle
+             */
+            order: number;
+        };
+        /**
          * SeenJson
          * @description Where the object is in one frame: the box round it, or its outline.
          */
@@ -3357,7 +3905,7 @@ export interface components {
              * Polygons
              * @description what an odd number of their rings enclose is inside; at most 20000 corners in all
              */
-            polygons?: components["schemas"]["PolygonJson"][] | null;
+            polygons?: components["schemas"]["ars_web__masks__masks_json__PolygonJson"][] | null;
             /**
              * Mask Png
              * @description base64 of an 8-bit greyscale PNG of the image's size, non-zero inside
@@ -3430,7 +3978,7 @@ export interface components {
              * Start
              * @description an outline to begin from, such as the last answer
              */
-            start?: components["schemas"]["PolygonJson"][] | null;
+            start?: components["schemas"]["ars_web__masks__masks_json__PolygonJson"][] | null;
         };
         /**
          * SessionChange
@@ -3463,7 +4011,7 @@ export interface components {
              * @default auto
              * @enum {string}
              */
-            format: "auto" | "ars" | "roars" | "tum" | "colmap" | "nerfstudio" | "poses";
+            format: "auto" | "ars" | "roars" | "tum" | "colmap" | "nerfstudio" | "bop" | "poses";
             /** Classes */
             classes?: string[];
         };
@@ -3618,6 +4166,67 @@ export interface components {
             width: number;
         };
         /**
+         * SymmetryAnswer
+         * @description How a class's objects look the same, as SymmetryJson takes it.
+         */
+        SymmetryAnswer: {
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "none" | "discrete" | "continuous";
+            /**
+             * Rotations
+             * @description of a discrete one; whatever follows from them counts too
+             */
+            rotations: components["schemas"]["RotationJson"][];
+            /**
+             * Axis
+             * @description of a continuous one; of unit length
+             */
+            axis: [
+                number,
+                number,
+                number
+            ] | null;
+            /**
+             * Flip
+             * @description whether a half turn across the axis changes nothing either
+             */
+            flip: boolean;
+        };
+        /**
+         * SymmetryJson
+         * @description How an object looks the same: `discrete` with its `rotations`, `continuous` with its `axis`, or `none`.
+         */
+        SymmetryJson: {
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "none" | "discrete" | "continuous";
+            /**
+             * Rotations
+             * @description of a discrete one: whatever follows from them counts too
+             */
+            rotations?: components["schemas"]["RotationJson"][];
+            /**
+             * Axis
+             * @description of a continuous one: any turn about it changes nothing
+             */
+            axis?: [
+                number,
+                number,
+                number
+            ] | null;
+            /**
+             * Flip
+             * @description of a continuous one: a half turn across the axis changes nothing either
+             * @default false
+             */
+            flip: boolean;
+        };
+        /**
          * TellingFrameJson
          * @description A frame in which errors of the box show.
          */
@@ -3716,7 +4325,7 @@ export interface components {
              * Polygons
              * @description what an odd number of their rings enclose is inside; at most 20000 corners in all
              */
-            polygons?: components["schemas"]["PolygonJson"][] | null;
+            polygons?: components["schemas"]["ars_web__masks__masks_json__PolygonJson"][] | null;
             /**
              * Mask Png
              * @description base64 of an 8-bit greyscale PNG of the image's size, non-zero inside
@@ -3761,6 +4370,43 @@ export interface components {
             shapes: string[];
             /** Options */
             options: components["schemas"]["OptionJson"][];
+        };
+        /**
+         * PolygonJson
+         * @description A ring with its holes; image coordinates of the original image, rings not closed.
+         */
+        ars_web__masks__masks_json__PolygonJson: {
+            /** Outer */
+            outer: [
+                number,
+                number
+            ][];
+            /** Holes */
+            holes?: [
+                number,
+                number
+            ][][];
+        };
+        /**
+         * PolygonJson
+         * @description A planar polygon that an object is.
+         */
+        ars_web__sessions__polygon_json__PolygonJson: {
+            /**
+             * Polygon
+             * @description its corners in order, metres; they lie in a plane, and the outline does not cross itself
+             */
+            polygon: [
+                number,
+                number,
+                number
+            ][];
+            /**
+             * Frame Of
+             * @description whose coordinates they are in
+             * @enum {string}
+             */
+            frame_of: "box" | "world";
         };
         /**
          * ConflictedMessage
@@ -5079,7 +5725,7 @@ export interface operations {
                      * @default auto
                      * @enum {string}
                      */
-                    format?: "auto" | "ars" | "roars" | "tum" | "colmap" | "nerfstudio" | "poses";
+                    format?: "auto" | "ars" | "roars" | "tum" | "colmap" | "nerfstudio" | "bop" | "poses";
                 };
             };
         };
@@ -6686,7 +7332,7 @@ export interface operations {
     "frame-marks-list": {
         parameters: {
             query: {
-                function: "box" | "convex" | "silhouette" | "rectangle" | "keypoints";
+                function: "box" | "convex" | "outline" | "silhouette" | "rectangle" | "keypoints";
                 /** @description default: the hull where a box has one, else the box */
                 shape?: ("box" | "hull" | "mesh") | null;
             };
@@ -6776,7 +7422,7 @@ export interface operations {
     "exports-picture": {
         parameters: {
             query: {
-                format: "yolo" | "coco" | "voc" | "ars";
+                format: "yolo" | "yolo-seg" | "yolo-obb" | "yolo-pose" | "coco" | "voc" | "kitti" | "bop" | "dope" | "cvat" | "cvat-polygons" | "cvat-video" | "parquet" | "masks" | "compass" | "ars";
                 /** @description default: one with many labels */
                 frame?: number | null;
                 /** @description default: the hull where a box has one, else the box */
@@ -6922,6 +7568,242 @@ export interface operations {
             };
             /** @description a thing named in the path is not there */
             404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description beyond a limit, which the detail names */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "labels-import": {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description a repeat with the same key answers what the first answered, and does nothing */
+                "idempotency-key"?: string | null;
+            };
+            path: {
+                sid: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["LabelsDraft"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ImportedLabelsJson"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the thing is not in a state that allows this */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description beyond a limit, which the detail names */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "labels-upload": {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description a repeat with the same key answers what the first answered, and does nothing */
+                "idempotency-key"?: string | null;
+            };
+            path: {
+                sid: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "multipart/form-data": {
+                    /**
+                     * Format: binary
+                     * @description a COCO or CVAT file, or a zip with one, or with a BOP scene and its models
+                     */
+                    file: string;
+                    /**
+                     * @default auto
+                     * @enum {string}
+                     */
+                    format?: "auto" | "bop" | "coco" | "cvat";
+                    /**
+                     * @default false
+                     * @enum {string}
+                     */
+                    dry_run?: "true" | "false";
+                };
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ImportedLabelsJson"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the thing is not in a state that allows this */
+            409: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -8309,6 +9191,822 @@ export interface operations {
                 };
                 content: {
                     "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "classes-put-mesh": {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description the ETag of the thing as it was read */
+                "if-match"?: string | null;
+            };
+            path: {
+                sid: string;
+                class_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "multipart/form-data": {
+                    /**
+                     * Format: binary
+                     * @description an obj, ply, glb or stl, by its name's ending
+                     */
+                    file: string;
+                    /**
+                     * @description of the file's numbers
+                     * @enum {string}
+                     */
+                    unit: "mm" | "cm" | "m" | "in";
+                    /** @description which axes of the file run along the box's x, y and z, such as x,y,z or x,-z,y */
+                    axes: string;
+                    /**
+                     * @description what lies at the box's centre: the middle of the mesh's bounds, or the file's own origin
+                     * @default centre
+                     * @enum {string}
+                     */
+                    origin?: "centre" | "file";
+                    /**
+                     * @description whether the class's default_size becomes the mesh's extent; absent: where it has none
+                     * @enum {string}
+                     */
+                    fit_size?: "true" | "false";
+                };
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ClassMeshAnswer"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description stale `If-Match`; `current` holds the thing as it is now */
+            412: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["StaleProblem"];
+                };
+            };
+            /** @description beyond a limit, which the detail names */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description `If-Match` is missing */
+            428: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "classes-delete-mesh": {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description the ETag of the thing as it was read */
+                "if-match"?: string | null;
+            };
+            path: {
+                sid: string;
+                class_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ClassAnswer"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description stale `If-Match`; `current` holds the thing as it is now */
+            412: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["StaleProblem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description `If-Match` is missing */
+            428: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "boxes-mesh": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                sid: string;
+                box_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MeshJson"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "boxes-put-mesh": {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description the ETag of the thing as it was read */
+                "if-match"?: string | null;
+            };
+            path: {
+                sid: string;
+                box_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "multipart/form-data": {
+                    /**
+                     * Format: binary
+                     * @description an obj, ply, glb or stl, by its name's ending
+                     */
+                    file: string;
+                    /**
+                     * @description of the file's numbers
+                     * @enum {string}
+                     */
+                    unit: "mm" | "cm" | "m" | "in";
+                    /** @description which axes of the file run along the box's x, y and z, such as x,y,z or x,-z,y */
+                    axes: string;
+                    /**
+                     * @description what lies at the box's centre: the middle of the mesh's bounds, or the file's own origin
+                     * @default centre
+                     * @enum {string}
+                     */
+                    origin?: "centre" | "file";
+                };
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BoxMeshAnswer"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the thing is not in a state that allows this */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description stale `If-Match`; `current` holds the thing as it is now */
+            412: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["StaleProblem"];
+                };
+            };
+            /** @description beyond a limit, which the detail names */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description `If-Match` is missing */
+            428: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "boxes-delete-mesh": {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description the ETag of the thing as it was read */
+                "if-match"?: string | null;
+            };
+            path: {
+                sid: string;
+                box_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BoxAnswer"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the thing is not in a state that allows this */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description stale `If-Match`; `current` holds the thing as it is now */
+            412: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["StaleProblem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description `If-Match` is missing */
+            428: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "boxes-put-polygon": {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description the ETag of the thing as it was read */
+                "if-match"?: string | null;
+            };
+            path: {
+                sid: string;
+                box_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ars_web__sessions__polygon_json__PolygonJson"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BoxMeshAnswer"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the thing is not in a state that allows this */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description stale `If-Match`; `current` holds the thing as it is now */
+            412: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["StaleProblem"];
+                };
+            };
+            /** @description beyond a limit, which the detail names */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description `If-Match` is missing */
+            428: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "meshes-get": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                sid: string;
+                digest: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MeshSurface"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
                 };
             };
             /** @description a fault of the server, logged there under the number in the detail */

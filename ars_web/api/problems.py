@@ -21,6 +21,7 @@ from ars_web.errors import (
     ArsError,
     BadFile,
     BadInput,
+    BadOption,
     Cancelled,
     Conflict,
     Locked,
@@ -148,6 +149,9 @@ def of_error(error: ArsError, *, conditional: bool = False) -> ProblemResponse:
         return ProblemResponse(status, kind, title, str(error), current=current_json(error.current))
     if isinstance(error, ViewsDisagree):
         return ProblemResponse(status, kind, title, str(error), views=misfits_json(error))
+    if isinstance(error, BadOption):
+        errors = [{"where": f"options.{error.option}", "message": str(error)}]
+        return ProblemResponse(status, kind, title, str(error), errors=errors)
     return ProblemResponse(status, kind, title, str(error))
 
 
