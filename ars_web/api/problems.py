@@ -40,6 +40,7 @@ MEDIA_TYPE = "application/problem+json"
 STATUS: dict[type[ArsError], tuple[int, str, str]] = {
     BadFile: (422, "bad-file", "A file cannot be used"),
     BadInput: (422, "bad-input", "The request cannot be used"),
+    BadOption: (422, "bad-input", "The request cannot be used"),
     ViewsDisagree: (422, "views-disagree", "The outlines do not fit one object"),
     NotFound: (404, "not-found", "Not found"),
     NothingToUndo: (409, "nothing-to-undo", "Nothing to undo or redo"),
