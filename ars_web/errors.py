@@ -3,6 +3,7 @@
 ArsError                  the root; its message names the value, what is wrong with it and what to do
 ├── BadInput              a value, a file or a request that cannot be used as it is
 │   ├── BadFile           the same, in a file: the message begins with `FILE:LINE:` or `FILE:`
+│   ├── BadOption         an export option that cannot be as it is; `option` names it
 │   └── ViewsDisagree     outlines in several views that no one object can have
 ├── NotFound              a session, a frame, a box, a class or an export that is not there
 ├── Conflict              the thing was changed meanwhile; `current` holds what it is now
@@ -46,6 +47,21 @@ class BadFile(BadInput):
 
 def _bad_file(path: Path, message: str, line: int | None) -> BadFile:
     return BadFile(path, message, line=line)
+
+
+class BadOption(BadInput):
+    """An export option that cannot be as it is.
+
+    Attributes:
+        option: its name, such as `shape` or `split.train`.
+    """
+
+    def __init__(self, message: str, option: str) -> None:
+        super().__init__(message)
+        self.option = option
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return BadOption, (str(self), self.option)
 
 
 class ViewsDisagree(BadInput):

@@ -194,7 +194,7 @@ export const imageAddress = (sid, index, options = {}) =>
 /** Why a frame's image cannot be shown, in words: an <img> does not tell. @param {string} sid @param {number} index */
 export async function imageProblem(sid, index) {
   try {
-    await request("GET", imageAddress(sid, index, { width: 16 }), { parsed: false });
+    await request("GET", imageAddress(sid, index, { width: 16 }), { as: "nothing" });
     return "The image could not be loaded just now. Try again.";
   } catch (error) {
     if (error instanceof ApiError) return error.message;
@@ -257,6 +257,14 @@ export const formats = () => request("GET", "/api/formats");
 export const previewExport = (sid, format, options, signal) =>
   request("POST", under(sid, "/exports/preview"), { body: { format, options }, signal });
 
+/**
+ * One frame as a format holds its labels.
+ * @param {string} sid @param {string} format @param {Record<string, unknown>} options those that a picture depends on @param {AbortSignal} [signal]
+ * @returns {Promise<Blob>}
+ */
+export const exportPicture = (sid, format, options, signal) =>
+  request("GET", under(sid, `/exports/picture?${query({ format, ...options })}`), { signal, as: "blob" });
+
 /** @param {string} sid @param {string} format @param {object} options @returns {Promise<Schemas["ExportJson"]>} */
 export const startExport = (sid, format, options) => request("POST", under(sid, "/exports"), { body: { format, options }, key: true });
 
@@ -316,20 +324,21 @@ function query(values) {
 /**
  * @param {string} method
  * @param {string} address
- * @param {{body?: object, revision?: number, key?: boolean, signal?: AbortSignal, parsed?: boolean}} [options]
- *   `revision`: what the change was made to; `key`: a repeat after a lost answer must not do it twice; `parsed`: the
- *   answer is JSON
+ * @param {{body?: object, revision?: number, key?: boolean, signal?: AbortSignal, as?: "json" | "blob" | "nothing"}} [options]
+ *   `body`: a form, or what is sent as JSON; `revision`: what the change was made to; `key`: a repeat after a lost answer
+ *   must not do it twice; `as`: what the answer is read as
  * @returns {Promise<any>}
  */
-async function request(method, address, { body, revision, key, signal, parsed = true } = {}) {
+async function request(method, address, { body, revision, key, signal, as = "json" } = {}) {
   /** @type {Record<string, string>} */
   const headers = {};
-  if (body !== undefined) headers["Content-Type"] = "application/json";
+  const isForm = body instanceof FormData; // of which the browser says the type itself
+  if (body !== undefined && !isForm) headers["Content-Type"] = "application/json";
   if (revision !== undefined) headers["If-Match"] = `"${revision}"`;
   if (key) headers["Idempotency-Key"] = randomName();
   // A change that is small, as these are, goes on its way also where the page is being closed.
   const keepalive = method === "PATCH" || method === "DELETE";
-  const send = () => fetch(address, { method, headers, body: body && JSON.stringify(body), signal, keepalive });
+  const send = () => fetch(address, { method, headers, body: isForm ? body : body && JSON.stringify(body), signal, keepalive });
   let response;
   try {
     response = await send().catch((error) => {
@@ -341,7 +350,7 @@ async function request(method, address, { body, revision, key, signal, parsed = 
     if (error instanceof DOMException && error.name === "AbortError") throw error;
     throw new ApiError("The server does not answer. Is it still running?", 0);
   }
-  if (response.ok) return response.status === 204 || !parsed ? undefined : response.json();
+  if (response.ok) return response.status === 204 || as === "nothing" ? undefined : response[as]();
   throw failure(response.status, await response.json().catch(() => ({})));
 }
 

@@ -81,6 +81,7 @@ Object.assign(
 
     formats: api.formats,
     previewExport: (format, options, signal) => api.previewExport(sid(), format, options, signal),
+    exportPicture: (format, options, signal) => api.exportPicture(sid(), format, options, signal),
     startExport: (format, options) => api.startExport(sid(), format, options),
     exports: () => api.exports(sid()),
     exportState: api.exportState,

@@ -230,6 +230,7 @@ export function setProblem(place, text) {
  *
  * @property {() => Promise<Schemas["FormatsJson"]>} formats
  * @property {(format: string, options: object, signal?: AbortSignal) => Promise<Schemas["Forecast"]>} previewExport
+ * @property {(format: string, options: Record<string, unknown>, signal?: AbortSignal) => Promise<Blob>} exportPicture one frame with its labels as a format holds them
  * @property {(format: string, options: object) => Promise<Export>} startExport
  * @property {() => Promise<Export[]>} exports
  * @property {(id: string) => Promise<Export>} exportState

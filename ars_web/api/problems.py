@@ -21,6 +21,7 @@ from ars_web.errors import (
     ArsError,
     BadFile,
     BadInput,
+    BadOption,
     Cancelled,
     Conflict,
     Locked,
@@ -39,6 +40,7 @@ MEDIA_TYPE = "application/problem+json"
 STATUS: dict[type[ArsError], tuple[int, str, str]] = {
     BadFile: (422, "bad-file", "A file cannot be used"),
     BadInput: (422, "bad-input", "The request cannot be used"),
+    BadOption: (422, "bad-input", "The request cannot be used"),
     ViewsDisagree: (422, "views-disagree", "The outlines do not fit one object"),
     NotFound: (404, "not-found", "Not found"),
     NothingToUndo: (409, "nothing-to-undo", "Nothing to undo or redo"),
@@ -148,6 +150,9 @@ def of_error(error: ArsError, *, conditional: bool = False) -> ProblemResponse:
         return ProblemResponse(status, kind, title, str(error), current=current_json(error.current))
     if isinstance(error, ViewsDisagree):
         return ProblemResponse(status, kind, title, str(error), views=misfits_json(error))
+    if isinstance(error, BadOption):
+        errors = [{"where": f"options.{error.option}", "message": str(error)}]
+        return ProblemResponse(status, kind, title, str(error), errors=errors)
     return ProblemResponse(status, kind, title, str(error))
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from ars_web.errors import BadInput
+from ars_web.errors import BadInput, BadOption
 from ars_web.geometry.box import Box
 from ars_web.geometry.camera import Camera
 from ars_web.geometry.keypoints import Keypoint, keypoints_world
@@ -110,6 +110,8 @@ def check_shape(shape: str | None, snapshots: Sequence[SessionSnapshot]) -> None
         raise BadInput(f"shape {shape!r} is unknown; known are {', '.join(SHAPES)}")
     boxes = [(snapshot, box) for snapshot in snapshots for box in snapshot.state.boxes.values()]
     if shape == "mesh" and boxes and all(snapshot.state.mesh_of(box) is None for snapshot, box in boxes):
-        raise BadInput(
-            "shape 'mesh' needs a mesh, and no class or box here has one; give a class its mesh, or use 'box' or 'hull'"
+        raise BadOption(
+            "shape 'mesh' needs a mesh, and no class or box here has one; "
+            "give a class its mesh, or use 'box' or 'hull'",
+            "shape",
         )

@@ -20,7 +20,7 @@ def test_every_error_has_its_row() -> None:
 
 @pytest.mark.parametrize("error", STATUS)
 def test_a_row_is_what_is_answered(error: type[errors.ArsError]) -> None:
-    more = {errors.BadFile: ("is wrong",), errors.ViewsDisagree: (((3, 1.5),),)}
+    more = {errors.BadFile: ("is wrong",), errors.BadOption: ("shape",), errors.ViewsDisagree: (((3, 1.5),),)}
     made = error("here is wrong", *more.get(error, ()))
     answer = of_error(made)
     body = httpx.Response(200, content=answer.body).json()
@@ -34,6 +34,12 @@ def test_views_that_disagree_are_named_with_their_pixels_if_any_number_helps() -
     answer = of_error(errors.ViewsDisagree("frames 4 and 2 do not meet", ((4, 12.5), (2, math.nan))))
     views = httpx.Response(200, content=answer.body).json()["views"]
     assert views == [{"frame": 4, "misfit_px": 12.5}, {"frame": 2, "misfit_px": None}]
+
+
+def test_an_option_is_named() -> None:
+    answer = of_error(errors.BadOption("no object has a mesh", "shape"))
+    assert answer.status_code == 422
+    assert httpx.Response(200, content=answer.body).json()["errors"] == [{"where": "options.shape", "message": "no object has a mesh"}]
 
 
 def test_a_conflict_is_a_failed_precondition_only_where_there_was_one() -> None:

@@ -306,3 +306,47 @@ def test_a_newer_question_ends_the_older_and_old_figures_stay_meanwhile(boxed_se
         expect(forecast(page).locator('[data-count="frames"]')).to_have_text("3")
         counted(page)
         assert len(held) == 1
+
+
+def test_the_picture_is_the_chosen_format_s_and_what_cannot_be_is_said_in_its_place(boxed_session, open_flatly) -> None:
+    with open_flatly(*boxed_session) as workspace:
+        page = workspace.page
+        open_panel(page)
+        picture = page.get_by_role("figure", name="What the format holds").get_by_role("img")
+        address = f"/api/sessions/{workspace.sid}/exports/picture?format=yolo-seg"
+        with page.expect_response(lambda answer: answer.url.endswith(address)) as answered:
+            page.get_by_role("radio", name="YOLO, outlines").check()
+        expect(picture).to_have_attribute("alt", "A frame with its labels as YOLO, outlines holds them")
+        expect(picture).to_have_attribute("data-stale", "false")
+        assert answered.value.headers["content-type"] == "image/jpeg"
+        assert picture.evaluate("image => image.naturalWidth / image.naturalHeight") == pytest.approx(480 / 360)
+        with page.expect_response(lambda answer: "max_truncated=0.2" in answer.url) as answered:
+            field(page, "Largest share outside").fill("0.2")
+            expect(picture).to_have_attribute("data-stale", "true")  # the old one stays meanwhile
+        assert answered.value.status == 200
+        expect(picture).to_have_attribute("data-stale", "false")
+
+        page.locator('.option[data-name="shape"]').get_by_role("radio", name="Mesh").check()
+        for place in (problem_at(page, "shape"), page.get_by_role("figure").get_by_role("alert")):
+            expect(place).to_contain_text("give a class its mesh")
+        expect(page.locator(".start button")).to_have_attribute("aria-disabled", "true")
+        page.get_by_role("button", name="Reset Label shape to Hull").click()
+        expect(problem_at(page, "shape")).to_have_count(0)
+        expect(picture).to_have_attribute("data-stale", "false")
+        workspace.complaints[:] = [one for one in workspace.complaints if "422" not in one]
+
+
+def test_what_a_format_cannot_hold_is_said_before_and_after(boxed_session, open_flatly) -> None:
+    with open_flatly(*boxed_session) as workspace:
+        page = workspace.page
+        told = {"format": "kitti", "options": {"images": "none"}}
+        counts = workspace.client.post(f"/api/sessions/{workspace.sid}/exports/preview", json=told).json()
+        assert counts["losses"]
+        assert workspace.client.post(f"/api/sessions/{workspace.sid}/exports", json=told).status_code == 202
+        open_panel(page)
+        page.get_by_role("radio", name="KITTI object detection").check()
+        counted(page)
+        expect(warning(page, "losses").locator(".problem")).to_have_text(counts["losses"])
+        expect(
+            rows(page, "done").get_by_role("list", name="What it does not hold").get_by_role("listitem")
+        ).to_have_text(counts["losses"])

@@ -11,7 +11,7 @@ import { many, REASONS } from "./words.js";
 /** @param {{found: Forecast}} props */
 export function Advice({ found }) {
   const warnings = warningsOf(found);
-  if (warnings.length === 0) return null;
+  if (warnings.length === 0 && found.losses.length === 0) return null;
   return html`<ul class="advice" aria-label="Before you start">
     ${warnings.map(
       ({ id, text, remedy }) => html`<li key=${id} data-warning=${id}>
@@ -19,6 +19,8 @@ export function Advice({ found }) {
         ${remedy !== null && html`<button class="button" onClick=${remedy.act}>${remedy.words}</button>`}
       </li>`,
     )}
+    ${found.losses.length > 0 &&
+    html`<li key="losses" data-warning="losses"><div>${found.losses.map((text) => html`<p key=${text} class="problem">${text}</p>`)}</div></li>`}
   </ul>`;
 }
 

@@ -133,7 +133,7 @@ export function refuse(errors) {
   const found = new Map();
   const names = options.value.flatMap(({ name }) => [name, name.split(".")[0]]);
   for (const { where, message } of errors) {
-    const path = where.replace(/^body\.options\./, "");
+    const path = where.replace(/^(body\.)?options\./, "");
     const of = [path, ...names].find((name) => names.includes(name) && (path === name || path.startsWith(`${name}.`)));
     found.set(of ?? "", message);
   }

@@ -2,10 +2,12 @@
 
 import { html, useEffect, useSignal } from "../../lib/view.js";
 import { actions } from "../../store.js";
-import { asked, changes, format, isSound, mistakes, offer, options, refusals, reset, writers } from "./draft.js";
+import { asked, changes, format, isSound, mistakes, offer, options, refusals, reset } from "./draft.js";
 import { forecast, ForecastView, isCurrent, refused, useForecast } from "./forecast.js";
+import { Formats } from "./formats.js";
 import { OptionGroup } from "./option_group.js";
 import { begin, exports, isGoing, PastExports, watch } from "./past.js";
+import { FormatPicture } from "./picture.js";
 import { many } from "./words.js";
 
 /** @typedef {import("./draft.js").Option} Option */
@@ -44,7 +46,7 @@ export function ExportPanel() {
       ${grouped().map(({ title, holder, found }) => html`<${OptionGroup} key=${holder} title=${title} holder=${holder} options=${found} />`)}
     </div>
     <div class="outcome-column">
-      <div class="outcome"><${ForecastView} /><${PastExports} /></div>
+      <div class="outcome"><${FormatPicture} /><${ForecastView} /><${PastExports} /></div>
       <${Start} />
     </div>
   </div>`;
@@ -61,17 +63,6 @@ function grouped() {
     const title = GROUPS.find((group) => group.holder === holder)?.title ?? holder;
     return of.length > 0 ? [{ title, holder, found: of }] : [];
   });
-}
-
-function Formats() {
-  return html`<div class="formats" role="radiogroup" aria-label="Format">
-    ${writers.value.map(
-      (writer) => html`<label key=${writer.format} class="card format" data-chosen=${writer.format === format.value}>
-        <input type="radio" name="format" aria-label=${writer.title} aria-describedby=${`format-${writer.format}`} value=${writer.format} checked=${writer.format === format.value} onChange=${() => (format.value = writer.format)} />
-        <span><strong>${writer.title}</strong><span class="meaning" id=${`format-${writer.format}`}>${writer.description}</span></span>
-      </label>`,
-    )}
-  </div>`;
 }
 
 /** Go to what has to be set right first. */

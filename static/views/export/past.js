@@ -160,7 +160,11 @@ function State({ one }) {
   }
   if (one.state === "failed") return html`<p class="problem">${one.error}</p>`;
   if (one.state === "cancelled") return html`<p class="muted">Cancelled${one.total > 0 ? ` after ${figure(one.done)} of ${many(one.total, "frame")}` : ""}</p>`;
-  return html`<p class="counts-words">${countsWords(/** @type {Report} */ (one.report))}</p>`;
+  const report = /** @type {Report | null} */ (one.report);
+  // Those of older programs do not say.
+  const losses = report?.losses ?? [];
+  return html`<p class="counts-words">${countsWords(report)}</p>
+    ${losses.length > 0 && html`<ul class="losses" aria-label="What it does not hold">${losses.map((text) => html`<li key=${text} class="problem">${text}</li>`)}</ul>`}`;
 }
 
 /** @param {Report | null} report */
