@@ -39,7 +39,9 @@ def test_views_that_disagree_are_named_with_their_pixels_if_any_number_helps() -
 def test_an_option_is_named() -> None:
     answer = of_error(errors.BadOption("no object has a mesh", "shape"))
     assert answer.status_code == 422
-    assert httpx.Response(200, content=answer.body).json()["errors"] == [{"where": "options.shape", "message": "no object has a mesh"}]
+    assert httpx.Response(200, content=answer.body).json()["errors"] == [
+        {"where": "options.shape", "message": "no object has a mesh"}
+    ]
 
 
 def test_a_conflict_is_a_failed_precondition_only_where_there_was_one() -> None:
