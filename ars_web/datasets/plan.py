@@ -16,7 +16,7 @@ from ars_web.datasets import splits
 from ars_web.datasets.file_names import stems
 from ars_web.datasets.image_stamps import stamps_now
 from ars_web.datasets.options import ExportOptions, FrameChoice
-from ars_web.datasets.planned import ExportPlan, PlannedClass, PlannedFrames, PlannedSession, seconds_per_frame
+from ars_web.datasets.planned import SECONDS_PER_FRAME, ExportPlan, PlannedClass, PlannedFrames, PlannedSession
 from ars_web.datasets.registry import writer_of
 from ars_web.datasets.shapes import check_shape, meshes_of, shape_kinds
 from ars_web.errors import BadInput
@@ -86,8 +86,9 @@ def plan_export(
         sources=sources,
     )
     most_boxes = max(len(session.boxes) for session in sessions)
-    length = frames_per_shard or _frames_per_shard(len(frames), most_boxes, seconds_per_frame(format, options))
-    plan = ExportPlan(out, format, options, classes, sessions, frames, _shards(counts, length))
+    cost = SECONDS_PER_FRAME[options.images] + writer.seconds_per_frame(options)
+    length = frames_per_shard or _frames_per_shard(len(frames), most_boxes, cost)
+    plan = ExportPlan(out, format, options, classes, sessions, frames, _shards(counts, length), cost)
     # A format that can hold nothing useful of it, or not be written here, says so now and not when all is done.
     writer.losses(plan)
     return plan

@@ -89,6 +89,7 @@ def read_plan(folder: Path, *, out: Path) -> ExportPlan:
         sessions=sessions,
         frames=PlannedFrames(**numbers, names=texts["names"], stems=texts["stems"], sources=texts["sources"]),
         shards=tuple((start, stop) for start, stop in document["shards"]),
+        seconds_per_frame=document["seconds_per_frame"],
     )
 
 
@@ -113,6 +114,7 @@ def _document(plan: ExportPlan) -> bytes:
                 for s in plan.sessions
             ],
             "shards": plan.shards,
+            "seconds_per_frame": plan.seconds_per_frame,
         }
     ).encode()
 

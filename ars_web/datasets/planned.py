@@ -17,15 +17,6 @@ from ars_web.geometry.symmetry import Symmetry
 SECONDS_PER_FRAME = {"none": 0.0003, "link": 0.0005, "copy": 0.001, "rectify": 0.02}
 """Rough cost on one core, by where the images come from: what shards are cut by, never what is promised."""
 
-SECONDS_PER_MASKED_FRAME = 0.05
-"""The same of a frame whose objects' masks are written."""
-
-
-def seconds_per_frame(format: str, options: ExportOptions) -> float:  # noqa: A002 - the contract's name
-    """Rough cost on one core of a frame of an export."""
-    masked = format == "bop" and options.masks == "write"
-    return SECONDS_PER_FRAME[options.images] + masked * SECONDS_PER_MASKED_FRAME
-
 
 @dataclass(frozen=True)
 class PlannedClass:
@@ -103,6 +94,7 @@ class ExportPlan:
         out: the dataset's folder, absolute; not there yet, or empty.
         classes: of the dataset, a class's id being its place: those of the sessions, merged by name in order.
         shards: ranges of frames, each within one session.
+        seconds_per_frame: rough work on one core.
     """
 
     out: Path
@@ -112,6 +104,7 @@ class ExportPlan:
     sessions: tuple[PlannedSession, ...]
     frames: PlannedFrames
     shards: tuple[tuple[int, int], ...]
+    seconds_per_frame: float
 
     @property
     def class_names(self) -> tuple[str, ...]:
@@ -121,4 +114,4 @@ class ExportPlan:
     @property
     def seconds(self) -> float:
         """Rough work in seconds on one core."""
-        return len(self.frames) * seconds_per_frame(self.format, self.options)
+        return len(self.frames) * self.seconds_per_frame

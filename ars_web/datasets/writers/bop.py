@@ -42,6 +42,10 @@ _IMAGE_BYTES = 32
 """A line's beginning and end."""
 
 
+SECONDS_OF_MASKS = 0.05
+"""Rough work on one core of a frame whose masks are written."""
+
+
 def _text(text: str) -> UInt8[np.ndarray, "size"]:
     return np.frombuffer(text.encode(), dtype=np.uint8)
 
@@ -310,6 +314,8 @@ WRITER = Writer(
     join=_join,
     shows=("silhouette",),
     losses=_losses,
+    seconds_per_frame=lambda options: SECONDS_OF_MASKS if options.masks == "write" else 0.0,
+    own_options=("masks",),
     with_visible=True,
     with_outlines=True,
     numbered=True,

@@ -31,6 +31,10 @@ _PNG = [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PN
 """Runs alone are looked for: masks are little else, and such files are half as large."""
 
 
+SECONDS_OF_MASKS = 0.1
+"""Rough work on one core of a frame: its masks, and two PNG files."""
+
+
 def instance_ids(
     masks: InstanceMasks, keep: Bool[np.ndarray, "b"], box_ids: Sequence[int]
 ) -> UInt16[np.ndarray, "h w"]:
@@ -131,6 +135,7 @@ WRITER = Writer(
     image_folder=lambda split: "images",
     write=_write,
     join=_join,
-    shows=("silhouette",),
+    shows=("mask",),
     losses=_losses,
+    seconds_per_frame=lambda options: SECONDS_OF_MASKS,
 )

@@ -108,6 +108,11 @@ def no_losses(plan: ExportPlan) -> Sequence[str]:
     return ()
 
 
+def no_seconds(options: ExportOptions) -> float:
+    """Of a format that is written nearly as soon as its labels are known."""
+    return 0.0
+
+
 @dataclass(frozen=True)
 class Writer:
     """A dataset format.
@@ -128,6 +133,7 @@ class Writer:
         label_functions: those whose marks it writes.
         losses: what of a plan it cannot hold, one line each, told before and after an export; it raises BadInput
             where nothing useful would be left.
+        seconds_per_frame: rough work of its own on one core, beyond labels and images; shards are cut by it.
         own_options: the export options that mean something to it alone, or to it and few others.
         with_visible: whether it writes visible fractions.
         with_outlines: whether it writes outlines, each as one ring.
@@ -146,6 +152,7 @@ class Writer:
     shows: tuple[str, ...] = ("box",)
     label_functions: tuple[str, ...] = ()
     losses: Callable[[ExportPlan], Sequence[str]] = no_losses
+    seconds_per_frame: Callable[[ExportOptions], float] = no_seconds
     own_options: tuple[str, ...] = ()
     with_visible: bool = False
     with_outlines: bool = False
