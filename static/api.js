@@ -132,6 +132,15 @@ export const restOnGround = (sid, id, revision) => request("POST", under(sid, `/
 export const boxFromPoints = (sid, classId, points) =>
   request("POST", under(sid, "/boxes/from-points"), { body: { class_id: classId, points, frame_of: "world" }, key: true });
 
+/** @param {string} sid @param {number} id @returns {Promise<Schemas["ClassAnswer"]>} */
+export const classOf = (sid, id) => request("GET", under(sid, `/classes/${id}`));
+
+/** @param {string} sid @param {number} id @param {number} revision @param {FormData} form @returns {Promise<Schemas["ClassMeshAnswer"]>} */
+export const putClassMesh = (sid, id, revision, form) => request("PUT", under(sid, `/classes/${id}/mesh`), { revision, body: form });
+
+/** @param {string} sid @param {number} id @param {number} revision @returns {Promise<Schemas["ClassAnswer"]>} */
+export const deleteClassMesh = (sid, id, revision) => request("DELETE", under(sid, `/classes/${id}/mesh`), { revision });
+
 /** @param {string} sid @param {string} name @returns {Promise<Schemas["ClassAnswer"]>} */
 export const addClass = (sid, name) => request("POST", under(sid, "/classes"), { body: { name }, key: true });
 
@@ -160,6 +169,10 @@ export const frames = (sid, offset, limit) => request("GET", under(sid, `/frames
 
 /** @param {string} sid @param {number} index @returns {Promise<Schemas["LabelJson"][]>} */
 export const frameLabels = (sid, index) => request("GET", under(sid, `/frames/${index}/labels?shape=box`));
+
+/** @param {string} sid @param {number} index @param {string} labelFunction @param {string} shape @param {AbortSignal} [signal] @returns {Promise<Schemas["MarkJson"][]>} */
+export const frameMarks = (sid, index, labelFunction, shape, signal) =>
+  request("GET", under(sid, `/frames/${index}/marks?${query({ function: labelFunction, shape })}`), { signal });
 
 /**
  * @param {string} sid

@@ -226,13 +226,39 @@ export async function addClass(name) {
   return made;
 }
 
+/** @param {number} id */
+function existingClass(id) {
+  const known = store.classes.value.get(id);
+  if (known === undefined) throw new api.ApiError("This class has been deleted.", 404);
+  return known;
+}
+
 /** @param {number} id @param {object} changes */
 export async function changeClass(id, changes) {
   await inTurn("classes", async () => {
-    const known = store.classes.value.get(id);
-    if (known === undefined) throw new api.ApiError("This class has been deleted.", 404);
-    takeClass(await api.changeClass(store.sid.value, id, known.revision, changes));
+    takeClass(await api.changeClass(store.sid.value, id, existingClass(id).revision, changes));
   });
+}
+
+/** @param {number} id @param {FormData} form the file, and what its numbers mean */
+export async function putClassMesh(id, form) {
+  return inTurn("classes", async () => {
+    const { notes, ...made } = await api.putClassMesh(store.sid.value, id, existingClass(id).revision, form);
+    takeClass(made);
+    return notes;
+  });
+}
+
+/** @param {number} id */
+export async function deleteClassMesh(id) {
+  await inTurn("classes", async () => {
+    takeClass(await api.deleteClassMesh(store.sid.value, id, existingClass(id).revision));
+  });
+}
+
+/** What edits do not tell of a class: how large its mesh is, and where it came from. @param {number} id */
+export async function completeClass(id) {
+  takeClass(await api.classOf(store.sid.value, id));
 }
 
 /** @param {number} id */
@@ -246,7 +272,8 @@ export async function deleteClass(id) {
 /** @param {import("./store.js").ObjectClass} made */
 function takeClass(made) {
   const known = store.classes.value.get(made.id);
-  if (known === undefined || known.revision < made.revision) {
+  // The same edit may have come over the live line already, which tells less of a mesh.
+  if (known === undefined || known.revision <= made.revision) {
     store.classes.value = new Map(store.classes.value).set(made.id, made);
   }
 }

@@ -243,7 +243,7 @@ function takeEdit(edit) {
   const masks = new Map(store.masks.value);
   for (const change of edit.changes) {
     if (change.kind === "box") put(boxes, edit.revision, /** @type {Box | null} */ (change.after), /** @type {number} */ (change.id));
-    else if (change.kind === "class") put(classes, edit.revision, /** @type {ObjectClass | null} */ (change.after), /** @type {number} */ (change.id));
+    else if (change.kind === "class") put(classes, edit.revision, withMesh(/** @type {ObjectClass | null} */ (change.after), classes), /** @type {number} */ (change.id));
     else if (change.kind === "mask") put(masks, edit.revision, /** @type {import("./store.js").Mask | null} */ (change.after), /** @type {number} */ (change.id));
     else if (store.session.value !== null) store.session.value = { ...store.session.value, name: String(change.after) };
   }
@@ -253,6 +253,15 @@ function takeEdit(edit) {
   store.revision.value = Math.max(store.revision.value, edit.revision);
   store.latestEdit.value = edit;
   if (store.selected.value !== null && !store.isObject(store.selected.value)) store.selected.value = null;
+}
+
+/**
+ * A class of an edit, which has its mesh's digest alone, with what is known of that mesh.
+ * @param {ObjectClass | null} after @param {ReadonlyMap<number, ObjectClass>} known
+ */
+function withMesh(after, known) {
+  const mesh = after === null ? null : (known.get(after.id)?.mesh ?? null);
+  return after === null || mesh === null || after.mesh?.digest !== mesh.digest ? after : { ...after, mesh };
 }
 
 /**

@@ -10,6 +10,8 @@ import { computed, signal } from "./lib/view.js";
 /** @typedef {Schemas["SessionJson"]} Session */
 /** @typedef {Schemas["BoxAnswer"]} Box */
 /** @typedef {Schemas["ClassAnswer"]} ObjectClass */
+/** How a class's objects look the same. @typedef {Partial<Schemas["SymmetryAnswer"]> & {kind: Schemas["SymmetryAnswer"]["kind"]}} SymmetryDraft */
+/** @typedef {Schemas["KeypointAnswer"]} Keypoint */
 /** @typedef {Schemas["EditJson"]} Edit */
 /** @typedef {Schemas["CameraJson"]} Camera */
 /** @typedef {Schemas["ExportJson"]} Export */
@@ -100,6 +102,10 @@ export const upright = signal(false);
 export const hidden = signal(/** @type {ReadonlySet<number>} */ (new Set()));
 /** How much of the photo is seen over the 3D, 0 to 1. */
 export const blend = signal(1);
+/** The label function by which photos show objects as exports hold them; empty: by their boxes' edges. */
+export const markFunction = signal("");
+/** What is drawn so: hulls and meshes where there are some. */
+export const markShape = signal(/** @type {"hull" | "box" | "mesh"} */ ("hull"));
 /** Of the photo in frame mode. */
 export const zoom = signal(1);
 /** What lies over everything: the key list, the palette, the contact sheet. */
@@ -205,7 +211,10 @@ export function setProblem(place, text) {
  * @property {(id: string) => Promise<OutlineJob>} cancelOutline
  * @property {(id: number, orientation: "upright" | "free") => Promise<Refinement>} refineBox move a box to where it fits its masks best
  * @property {(name: string) => Promise<ObjectClass>} addClass
- * @property {(id: number, changes: {name?: string, color?: string, default_size?: [number, number, number] | null}) => Promise<void>} changeClass
+ * @property {(id: number, changes: {name?: string, color?: string, default_size?: [number, number, number] | null, symmetry?: SymmetryDraft | null, keypoints?: readonly Keypoint[] | null}) => Promise<void>} changeClass
+ * @property {(id: number, form: FormData) => Promise<string[]>} putClassMesh gives what was changed of the mesh, in words
+ * @property {(id: number) => Promise<void>} deleteClassMesh
+ * @property {(id: number) => Promise<void>} completeClass ask for what edits do not tell of a class's mesh
  * @property {(id: number) => Promise<void>} deleteClass
  * @property {(yours: BoxPreview) => Promise<void>} overrule store our side of a conflict after all
  * @property {() => Promise<void>} undo
@@ -222,6 +231,7 @@ export function setProblem(place, text) {
  * @property {(id: number) => Promise<Schemas["TellingFrameJson"][]>} tellingFrames
  * @property {(boxes: {T_world_box: Transform, size: [number, number, number]}[], frames: number[]) => Promise<Schemas["FramePreviewJson"][]>} labelsOf
  * @property {(index: number) => Promise<Schemas["LabelJson"][]>} frameLabels
+ * @property {(index: number, labelFunction: string, shape: string, signal?: AbortSignal) => Promise<Schemas["MarkJson"][]>} frameMarks
  * @property {(index: number, options?: {width?: number, crop?: [number, number, number, number]}) => string} imageAddress
  * @property {(index: number) => Promise<string>} imageProblem why a frame's image cannot be shown, in words
  * @property {(index: number) => Promise<string>} frameName

@@ -14,13 +14,20 @@ export function Popover({ label, anchor, onClose, above = false, children }) {
     const panel = /** @type {HTMLElement} */ (ref.current);
     const from = anchor.current;
     if (from === null) return;
-    const [place, { width, height }] = [from.getBoundingClientRect(), panel.getBoundingClientRect()];
-    const below = place.bottom + 4;
-    const isBelow = !above && below + height + 8 <= innerHeight;
-    panel.style.left = `${Math.max(8, Math.min(above ? place.left : place.right - width, innerWidth - width - 8))}px`;
-    panel.style.top = `${isBelow ? below : Math.max(8, place.top - height - 4)}px`;
+    const put = () => {
+      const [place, { width, height }] = [from.getBoundingClientRect(), panel.getBoundingClientRect()];
+      const below = place.bottom + 4;
+      const isBelow = !above && below + height + 8 <= innerHeight;
+      panel.style.left = `${Math.max(8, Math.min(above ? place.left : place.right - width, innerWidth - width - 8))}px`;
+      panel.style.top = `${isBelow ? below : Math.max(8, Math.min(place.top - 4, innerHeight - 8) - height)}px`;
+    };
+    put();
+    // What opens within it makes it higher.
+    const sized = new ResizeObserver(put);
+    sized.observe(panel);
     /** @type {HTMLElement | null} */ (panel.querySelector("input, button"))?.focus();
     return () => {
+      sized.disconnect();
       if (panel.contains(document.activeElement)) from.focus();
     };
   }, []);

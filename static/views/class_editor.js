@@ -1,12 +1,24 @@
-/** A class's name, colour and usual size, each stored as soon as it is given. */
+/** A class's name, colour, usual size, symmetry, keypoints and mesh, each stored as soon as it is given. */
 
 import { Popover } from "../lib/popover.js";
 import { parseQuantity, trimmed } from "../lib/quantity.js";
 import { html, useSignal } from "../lib/view.js";
 import * as store from "../store.js";
+import { ClassKeypoints } from "./class_keypoints.js";
+import { ClassMesh } from "./class_mesh.js";
+import { ClassSymmetry } from "./class_symmetry.js";
 
 /** @typedef {import("../store.js").ObjectClass} ObjectClass */
 /** @typedef {[number, number, number]} Triple */
+
+/**
+ * What the parts of the editor change a class by.
+ * @typedef {object} ClassPart
+ * @property {ObjectClass} one
+ * @property {(at: string, work: Promise<unknown>) => Promise<boolean>} tried whether it went well; else it is said at `at`
+ * @property {(at: string, text: string | null) => void} say what is wrong at a place, before the server is asked
+ * @property {(at: string) => any} wrong what is shown there
+ */
 
 /** Okabe and Ito's, told apart by colour-blind eyes. */
 const COLOURS = [
@@ -23,7 +35,7 @@ const COLOURS = [
 export function ClassEditor({ one, anchor, onClose }) {
   const problem = useSignal(/** @type {{at: string, text: string} | null} */ (null));
   const name = useSignal(/** @type {string | null} */ (null));
-  /** @param {string} at where it is shown if it fails @param {Promise<void>} work @returns {Promise<boolean>} */
+  /** @param {string} at where it is shown if it fails @param {Promise<unknown>} work @returns {Promise<boolean>} */
   const tried = async (at, work) => {
     problem.value = null;
     try {
@@ -50,6 +62,8 @@ export function ClassEditor({ one, anchor, onClose }) {
     if (await tried("delete", store.actions.deleteClass(one.id))) onClose();
   };
   const chosen = store.selectedBox.value;
+  /** @type {ClassPart} */
+  const part = { one, tried, wrong, say: (at, text) => (problem.value = text === null ? null : { at, text }) };
 
   return html`<${Popover} label=${`Class ${one.name}`} anchor=${anchor} onClose=${onClose}>
     <label class="line"><span class="muted">Name</span>
@@ -78,9 +92,15 @@ export function ClassEditor({ one, anchor, onClose }) {
     ${wrong("colour")}
     <${UsualSize} one=${one} resize=${resize} />
     ${wrong("size")}
-    <div class="line actions">
+    ${(chosen !== null || one.default_size !== null) &&
+    html`<div class="line actions">
       ${chosen !== null && html`<button class="button small" onClick=${() => void resize([...chosen.size])}>As ${chosen.name}</button>`}
       ${one.default_size !== null && html`<button class="button small" onClick=${() => void resize(null)}>No usual size</button>`}
+    </div>`}
+    <${ClassSymmetry} ...${part} />
+    <${ClassKeypoints} ...${part} />
+    <${ClassMesh} ...${part} />
+    <div class="line actions">
       <button class="button small bad" onClick=${() => void remove()}>Delete class</button>
     </div>
     ${wrong("delete")}

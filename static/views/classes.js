@@ -35,7 +35,7 @@ function ClassRow({ one, count }) {
   const open = useSignal(false);
   const boxes = count === 1 ? "1 box" : `${count.toLocaleString("en")} boxes`;
   return html`<li>
-    <button class="class-row" ref=${row} aria-haspopup="dialog" aria-expanded=${open.value} title="Change name, colour or usual size" onClick=${() => (open.value = !open.value)}>
+    <button class="class-row" ref=${row} aria-haspopup="dialog" aria-expanded=${open.value} title="Change its name, colour, size, symmetry, keypoints or mesh" onClick=${() => (open.value = !open.value)}>
       <span class="swatch" style=${{ background: one.color }}></span>
       <span class="name cut">${one.name}</span>
       <span class="muted">${one.default_size === null ? boxes : `${boxes}, ${sizeText(one.default_size)}`}</span>

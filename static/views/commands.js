@@ -2,6 +2,7 @@
 
 import { angleBetween, uprighted } from "../lib/rotation.js";
 import * as store from "../store.js";
+import { toggleAsExported } from "./as_exported.js";
 import { maskCommands, removeMask, stepDrawing } from "./masks/commands.js";
 import { begin } from "./masks/subject.js";
 import * as sight from "./photo_sight.js";
@@ -148,6 +149,7 @@ export const commands = [
     run: () => (store.blend.value = store.blend.value > 0 ? 0 : 1),
     when: inFrame,
   },
+  { id: "as-exported", title: "As exported, or not", group: "View", keys: ["O"], run: toggleAsExported, when: inFrame },
   { id: "zoom-in", title: "Zoom in", group: "View", keys: ["+", "="], run: sight.zoomIn, when: inFrame, repeats: true },
   { id: "zoom-out", title: "Zoom out", group: "View", keys: ["-"], run: sight.zoomOut, when: inFrame, repeats: true },
   { id: "whole-photo", title: "Whole photo", group: "View", keys: ["0"], run: sight.wholePhoto, when: inFrame },

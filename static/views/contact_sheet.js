@@ -5,9 +5,11 @@ import { Icon } from "../lib/icon.js";
 import { niceStep, niceSteps } from "../lib/nice_step.js";
 import { useScrollPlace } from "../lib/scroll_place.js";
 import { html, useEffect, useLayoutEffect, useMemo, useRef, useState } from "../lib/view.js";
-import { actions, frame, frames, mode, overlay, selectedBox, shownBoxes } from "../store.js";
+import { actions, frame, frames, markFunction, markShape, mode, overlay, revision, selectedBox, shownBoxes } from "../store.js";
+import { AsExported } from "./as_exported.js";
 import { ContactLabels } from "./contact_labels.js";
 import { ContactTile } from "./contact_tile.js";
+import { FrameMarks } from "./frame_marks.js";
 
 /** Tiles that the sheet opens with, at most. With steps of 1, 2, 5, … there are then at least 24, if there are so many frames. */
 const FIRST_SHOWN = 60;
@@ -24,6 +26,8 @@ export function ContactSheet() {
   const sheet = useRef(/** @type {HTMLDivElement | null} */ (null));
   const place = useScrollPlace(sheet);
   const labels = useMemo(() => new ContactLabels(), []);
+  const marks = useMemo(() => new FrameMarks(), []);
+  const isMarked = markFunction.value !== "";
   const count = frames.value;
   const [step, setStep] = useState(() => niceStep(frames.peek() / FIRST_SHOWN));
   const [wish, setWish] = useState(FIRST_WIDTH);
@@ -54,8 +58,14 @@ export function ContactSheet() {
   const state = shownBoxes.value;
   useEffect(() => {
     if (!place.resting) return;
-    labels.want(only ? [...shown, ...all] : shown);
-  }, [place, state, only, all, listed, columns]);
+    if (!isMarked || only) labels.want(only ? [...shown, ...all] : shown);
+  }, [place, state, only, all, listed, columns, isMarked]);
+  const way = `${markFunction.value} ${markShape.value} ${revision.value}`;
+  void marks.version.value;
+  useEffect(() => {
+    if (place.resting) marks.want(isMarked ? shown : []);
+  }, [place, way, only, all, listed, columns]);
+  useEffect(() => () => marks.want([]), []);
 
   // The frame at hand is where one comes in.
   const opened = useRef(false);
@@ -107,7 +117,7 @@ export function ContactSheet() {
     if (sheet.current !== null) sheet.current.scrollTop = 0;
   };
 
-  const problem = labels.problem.value;
+  const problem = (isMarked ? marks : labels).problem.value;
   return html`<${Dialog} label="Contact sheet" class="contact-sheet" onClose=${() => (overlay.value = null)}>
     <header>
       <h2>Contact sheet</h2>
@@ -119,6 +129,7 @@ export function ContactSheet() {
           onInput=${(/** @type {any} */ event) => setWish(Number(event.currentTarget.value))}
         />
       </label>
+      <${AsExported} />
       <label class="row" title=${box === null ? "Select a box first, in the list or in the scene." : ""}>
         <input
           type="checkbox" checked=${only} disabled=${box === null}
@@ -131,8 +142,8 @@ export function ContactSheet() {
     </header>
     ${problem !== null &&
     html`<p class="problem" role="alert">
-      The boxes could not be drawn: ${problem}
-      <button type="button" class="button" onClick=${() => labels.want(shown)}>Try again</button>
+      The boxes could not be drawn${isMarked ? " as exported" : ""}: ${problem}
+      <button type="button" class="button" onClick=${() => (isMarked ? marks : labels).want(shown)}>Try again</button>
     </p>`}
     <div class="sheet" ref=${sheet} onKeyDown=${keyed}>
       ${listed.length === 0 && html`<${Nothing} count=${count} name=${box?.name ?? ""} unchecked=${unchecked} step=${step} />`}
@@ -147,7 +158,7 @@ export function ContactSheet() {
               type="button" class="tile" data-at=${slot} tabindex=${slot === at ? 0 : -1} aria-label=${`Enter frame ${index}`}
               aria-current=${index === frame.value} onClick=${() => enter(index)} onFocus=${() => setActive(slot)}
             >
-              <${ContactTile} index=${index} drawn=${labels.of(index)} width=${width} size=${sizeOf?.size(index) ?? null} wanted=${place.resting} />
+              <${ContactTile} index=${index} drawn=${isMarked ? null : labels.of(index)} marks=${isMarked ? marks.of(index) : null} width=${width} size=${sizeOf?.size(index) ?? null} wanted=${place.resting} />
             </button>
           </li>`;
         })}

@@ -3,19 +3,22 @@
 import { html, useEffect, useState } from "../lib/view.js";
 import { actions, classes, hidden, selected } from "../store.js";
 import { FrameImage } from "./frame_image.js";
+import { MarksDrawing } from "./marks_drawing.js";
 
 /**
  * @param {object} props
  * @param {number} props.index of the frame
  * @param {readonly import("./contact_labels.js").Drawn[] | null} props.drawn
+ * @param {readonly import("./frame_marks.js").Mark[] | null} props.marks as exported, in place of the boxes
  * @param {number} props.width CSS pixels
  * @param {{width: number, height: number} | null} props.size of the image, its own pixels; null: not known yet
  * @param {boolean} props.wanted
  */
-export function ContactTile({ index, drawn, width, size, wanted }) {
+export function ContactTile({ index, drawn, marks, width, size, wanted }) {
   return html`<span class="picture">
       <${FrameImage} index=${index} width=${width} wanted=${wanted} />
       ${drawn !== null && size !== null && html`<${Wireframes} drawn=${drawn} size=${size} />`}
+      ${marks !== null && size !== null && html`<${MarksDrawing} marks=${marks} view=${[0, 0, size.width, size.height]} pixel=${size.width / width} />`}
     </span>
     <span class="caption"><strong>${index}</strong><${FrameName} index=${index} wanted=${wanted} /></span>`;
 }

@@ -4,6 +4,8 @@ import { command, press } from "./commands.js";
 import { Icon } from "../lib/icon.js";
 import { html, useEffect, useRef, useSignal, useSignalEffect } from "../lib/view.js";
 import * as store from "../store.js";
+import { AsExported } from "./as_exported.js";
+import { FlatFrame } from "./flat_frame.js";
 import { Hints } from "./hints.js";
 import { asked } from "./photo_sight.js";
 import { MadeBox, PointsTool } from "./points_tool.js";
@@ -56,12 +58,14 @@ export function Stage({ view }) {
 
   const mode = store.mode.value;
   const filled = mode === "export" || mode === "masks" || store.tool.value === "points";
+  const isFlat = mode === "frame" && !filled && store.markFunction.value !== "";
   return html`<main class="stage" aria-label="Scene">
     <iframe
-      ref=${frame} title="3D scene: the tracked cameras and the virtual boxes" inert=${filled}
+      ref=${frame} title="3D scene: the tracked cameras and the virtual boxes" inert=${filled || isFlat}
       src=${`/scene/${encodeURIComponent(store.sid.value)}/${view}/?fixedDpr=${fixedRatio()}`}
     ></iframe>
-    ${!ready.value && !filled && html`<div class="cover" role="status">Opening the scene</div>`}
+    ${!ready.value && !filled && !isFlat && html`<div class="cover" role="status">Opening the scene</div>`}
+    ${isFlat && html`<${FlatFrame} />`}
     ${!filled && html`<${Overlays} /><${Hints} />`}
     ${mode === "export" && html`<div class="filled"><${ExportPanel} /></div>`}
     ${mode === "masks" && html`<div class="filled"><${MasksMode} /></div>`}
@@ -76,6 +80,7 @@ function fixedRatio() {
 
 function Overlays() {
   const inFrame = store.mode.value === "frame";
+  const isFlat = inFrame && store.markFunction.value !== "";
   const problem = store.problems.value.get("scene");
   const drag = store.dragged.value;
   return html`
@@ -87,7 +92,7 @@ function Overlays() {
       </div>
       <${FrameSteps} />
       ${inFrame
-        ? html`<div class="chip" title="Wheel: zoom. Drag: pan. L: zoom to the selected box. 0: the whole photo.">${store.zoom.value.toFixed(1)}x</div>
+        ? html`${!isFlat && html`<div class="chip" title="Wheel: zoom. Drag: pan. L: zoom to the selected box. 0: the whole photo.">${store.zoom.value.toFixed(1)}x</div>`}
             <button class="chip button" onClick=${() => store.actions.leaveFrame()} title="Leave the frame (F)">Leave</button>`
         : html`<button class="chip button" onClick=${() => store.actions.enterFrame()} title="Enter this frame (F)">
             <${Icon} name="image" size=${14} />Enter
@@ -95,7 +100,9 @@ function Overlays() {
       <${MadeBox} />
     </div>
     <div class="corner bottom-left">
+      ${inFrame && html`<div class="chip"><${AsExported} /></div>`}
       ${inFrame &&
+      !isFlat &&
       html`<label class="chip">Photo
         <input
           type="range" min="0" max="1" step="0.05" value=${store.blend.value} aria-label="Photo over the 3D scene"

@@ -1,8 +1,10 @@
 /** The frames in which an error of the selected box would show most, with the box drawn over them as it is now. */
 
 import { paced } from "../lib/paced.js";
-import { html, useEffect, useRef, useSignal } from "../lib/view.js";
+import { html, useEffect, useMemo, useRef, useSignal } from "../lib/view.js";
 import * as store from "../store.js";
+import { FrameMarks } from "./frame_marks.js";
+import { MarksDrawing } from "./marks_drawing.js";
 
 /** @typedef {import("../store.js").Schemas["TellingFrameJson"]} TellingFrame */
 /** @typedef {[number, number][][]} Lines */
@@ -68,6 +70,14 @@ function Strip({ box }) {
     if (wish !== null && frames.value !== null && frames.value.length > 0) pace.current?.ask(JSON.parse(wish));
   }, [wish, isOpen]);
 
+  const marks = useMemo(() => new FrameMarks(), []);
+  // While it is dragged its edges say where it is.
+  const isMarked = store.markFunction.value !== "" && seen === box;
+  const way = `${isMarked} ${store.markFunction.value} ${store.markShape.value} ${store.revision.value}`;
+  useEffect(() => marks.want(isMarked ? (frames.value ?? []).map(({ frame }) => frame) : []), [way, frames.value]);
+  useEffect(() => () => marks.want([]), []);
+  void marks.version.value;
+
   const colour = store.classes.value.get(box.class_id)?.color ?? "currentColor";
   const found = frames.value;
   return html`<section class="panel-section" aria-label="Where an error shows most">
@@ -79,14 +89,17 @@ function Strip({ box }) {
     html`<ul class="telling">
       ${found === null
         ? Array.from({ length: COUNT }, (_, i) => html`<li key=${i} class="tile" aria-hidden="true"></li>`)
-        : found.map((one) => html`<${Tile} key=${one.frame} one=${one} lines=${lines.value.get(one.frame)} colour=${colour} />`)}
+        : found.map((one) => html`<${Tile} key=${one.frame} one=${one} id=${box.id} marks=${isMarked ? marks.of(one.frame) : null} lines=${lines.value.get(one.frame)} colour=${colour} />`)}
     </ul>`}
-    ${problem.value !== null && html`<p class="problem" role="alert">${problem.value}</p>`}
+    ${(problem.value ?? marks.problem.value) !== null && html`<p class="problem" role="alert">${problem.value ?? marks.problem.value}</p>`}
   </section>`;
 }
 
-/** @param {{one: TellingFrame, lines: Lines | undefined, colour: string}} props */
-function Tile({ one, lines, colour }) {
+/**
+ * `marks`: as exported, in place of the lines.
+ * @param {{one: TellingFrame, id: number, marks: readonly import("./frame_marks.js").Mark[] | null, lines: Lines | undefined, colour: string}} props
+ */
+function Tile({ one, id, marks, lines, colour }) {
   const { frame, px_per_mm, crop } = one;
   const broken = useSignal(/** @type {string | null} */ (null));
   // The lines are drawn over the picture that is seen, which is the one before until the next is there.
@@ -115,7 +128,9 @@ function Tile({ one, lines, colour }) {
         }}
       />
       ${broken.value !== null && html`<span class="broken" title=${broken.value}>${broken.value}</span>`}
-      ${lines !== undefined && seen.value !== null && broken.value === null &&
+      ${marks !== null && seen.value !== null && broken.value === null &&
+      html`<${MarksDrawing} marks=${marks} view=${[x0, y0, x1 - x0, y1 - y0]} pixel=${(x1 - x0) / WIDTH} only=${id} />`}
+      ${marks === null && lines !== undefined && seen.value !== null && broken.value === null &&
       html`<svg viewBox=${`${x0} ${y0} ${x1 - x0} ${y1 - y0}`} aria-hidden="true">
         ${["halo", "edge"].map((name) => html`<g class=${name} key=${name} style=${{ stroke: name === "edge" ? colour : undefined }}>
           ${lines.map((line, i) => html`<polyline key=${i} points=${line.map(([x, y]) => `${x},${y}`).join(" ")} />`)}

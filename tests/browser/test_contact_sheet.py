@@ -181,3 +181,55 @@ def test_a_frame_chosen_while_outlining_is_shown_beside_the_others(boxed_session
         expect(page.get_by_role("dialog", name="Contact sheet")).to_have_count(0)
         expect(panes).to_have_count(2)
         expect(page.get_by_role("button", name="Frame 7", exact=True).first).to_be_visible()
+
+
+def marks(page: Page, frame: int) -> dict[int, list[list[float]]]:
+    """The rings of each object on a tile, by its box's id."""
+    paths = (
+        tile(page, frame)
+        .locator("svg.marks g[data-box] path")
+        .evaluate_all("paths => paths.map((path) => [path.parentNode.dataset.box, path.getAttribute('d')])")
+    )
+    return {
+        int(box): [[float(x) for x in ring.rstrip("Z").replace("L", " ").split()] for ring in path.split("M")[1:]]
+        for box, path in paths
+    }
+
+
+def test_objects_are_drawn_as_exports_would_hold_them(boxed_session, open_flatly) -> None:
+    with open_flatly(*boxed_session, **SMALL) as workspace:
+        page = workspace.page
+        page.keyboard.press("c")
+        page.get_by_role("combobox", name="As exported").select_option("silhouette")
+        told = workspace.answer("/frames/3/marks?function=silhouette&shape=hull")
+        expected = {
+            one["box_id"]: [[side for corner in ring for side in corner] for ring in one["rings"]]
+            for one in told
+            if one["rings"]
+        }
+        expect(tile(page, 3).locator("svg.marks path")).to_have_count(len(expected))
+        assert marks(page, 3) == expected
+        expect(tile(page, 3).locator("svg.wireframes")).to_have_count(0)
+        # Meshes there are none of: that is said, and the way back is at hand.
+        page.get_by_role("combobox", name="Shapes").select_option("mesh")
+        expect(page.get_by_role("dialog").get_by_role("alert")).to_contain_text("give a class its mesh")
+        page.get_by_role("combobox", name="Shapes").select_option("box")
+        expect(page.get_by_role("dialog").get_by_role("alert")).to_have_count(0)
+        expect(tile(page, 3).locator("svg.marks path")).to_have_count(len(expected))
+        workspace.complaints[:] = [one for one in workspace.complaints if "422" not in one]
+
+
+def test_the_frame_at_hand_is_shown_flat_with_keypoints_as_exported(boxed_session, open_flatly) -> None:
+    with open_flatly(*boxed_session, **SMALL) as workspace:
+        page = workspace.page
+        page.keyboard.press("f")
+        page.get_by_role("combobox", name="As exported").select_option("keypoints")
+        flat = page.get_by_role("region", name="Frame 4 as exported")
+        told = workspace.answer("/frames/4/marks?function=keypoints&shape=hull")
+        for state in ("seen", "hidden"):
+            count = sum(point["state"] == state and point["at"] is not None for one in told for point in one["points"])
+            expect(flat.locator(f'circle[data-state="{state}"]')).to_have_count(count)
+        page.keyboard.press(".")
+        expect(page.get_by_role("region", name="Frame 5 as exported").get_by_role("img")).to_be_visible()
+        page.locator("body").press("o")
+        expect(page.get_by_role("region", name=re.compile("as exported"))).to_have_count(0)
