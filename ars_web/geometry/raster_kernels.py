@@ -96,11 +96,14 @@ class View(NamedTuple):
     Attributes:
         limit: the square of the radius up to which points are said to have an image: MARGIN times the image's own.
         bend: bound, up to there, on the second derivative of a straight line's image, in pixels.
+        rim, rim_bend: the same up to the lens's valid radius.
         low_x, high_x, low_y, high_y: bounds on the image's rays.
     """
 
     limit: float
     bend: float
+    rim: float
+    rim_bend: float
     low_x: float
     high_x: float
     low_y: float
@@ -108,7 +111,11 @@ class View(NamedTuple):
 
 
 class Grid(NamedTuple):
-    """Rays row by row, at the image points (u + j du, v + i dv)."""
+    """Rays row by row, at the image points (u + j du, v + i dv).
+
+    Attributes:
+        first_row, end_row, first_column, end_column: where there is something to draw.
+    """
 
     u: float
     v: float
@@ -116,6 +123,10 @@ class Grid(NamedTuple):
     dv: float
     rows: int
     columns: int
+    first_row: int
+    end_row: int
+    first_column: int
+    end_column: int
 
 
 @part
@@ -288,11 +299,9 @@ def place_images(lens: Lens, view: View, near: float, shapes: Shapes, b: int, pl
 
 
 @part
-def contour(
-    lens: Lens, limit: float, bend: float, shapes: Shapes, b: int, placed: Placed, pieces: Array, k: int
-) -> tuple[Array, int]:
+def contour(lens: Lens, view: View, shapes: Shapes, b: int, placed: Placed, pieces: Array, k: int) -> tuple[Array, int]:
     """Append the images, (u, v) to (u, v), of the edges between what of a shape is turned to the camera and what is not
-    to `pieces` (k, 4) after the first k; none where one of them is beyond `limit`.
+    to `pieces` (k, 4) after the first k; none where one of them is beyond the lens's rim.
 
     The sum of the edges' turns round a ray is how often the ray enters the shape (contour_kernels.py).
     """
@@ -305,8 +314,10 @@ def contour(
             i, j = j, i
         x0, y0 = points[0, i] / points[2, i], points[1, i] / points[2, i]
         x1, y1 = points[0, j] / points[2, j], points[1, j] / points[2, j]
-        if max(x0 * x0 + y0 * y0, x1 * x1 + y1 * y1) > limit:
+        furthest = max(x0 * x0 + y0 * y0, x1 * x1 + y1 * y1)
+        if furthest >= view.rim:
             return pieces, start
+        bend = view.bend if furthest <= view.limit else view.rim_bend
         off = 0.125 * bend * ((x1 - x0) ** 2 + (y1 - y0) ** 2)
         n = max(math.ceil(math.sqrt(off / STRAIGHT)), 1)
         if k + n > len(pieces):
@@ -456,14 +467,14 @@ def draw(
     sides, bounds = np.empty((3, 3)), np.empty((3, 4))
     furthest, rows, columns = 1.0 / near, grid.rows, grid.columns
     u, v, by_du, by_dv = grid.u, grid.v, 1.0 / grid.du, 1.0 / grid.dv
-    last_row, last_column = rows - 1.0, columns - 1.0
+    top, bottom, left, right = grid.first_row, grid.end_row - 1.0, grid.first_column, grid.end_column - 1.0
     low_x, high_x, low_y, high_y = -np.inf, np.inf, -np.inf, np.inf
     first = shapes.first_face[b]
     for k in range(first, first + placed.counts[b]):
-        first_column = math.ceil(max((reach[0, k] - u) * by_du, 0.0))
-        end_column = math.floor(min((reach[1, k] - u) * by_du, last_column)) + 1
-        first_row = math.ceil(max((reach[2, k] - v) * by_dv, 0.0))
-        end_row = math.floor(min((reach[3, k] - v) * by_dv, last_row)) + 1
+        first_column = math.ceil(max((reach[0, k] - u) * by_du, left))
+        end_column = math.floor(min((reach[1, k] - u) * by_du, right)) + 1
+        first_row = math.ceil(max((reach[2, k] - v) * by_dv, top))
+        end_row = math.floor(min((reach[3, k] - v) * by_dv, bottom)) + 1
         if first_row >= end_row or first_column >= end_column:
             continue
         f = placed.listed[k]
@@ -593,7 +604,7 @@ def visible_shares(
     is_placed, has_images, parted = np.empty(boxes, np.bool_), np.empty(boxes, np.bool_), np.empty(boxes, np.bool_)
     pieces, starts, ends = np.empty((4096, 4)), np.zeros(boxes, np.int64), np.zeros(boxes, np.int64)
     xs, ys, own, other = np.empty(0), np.empty(0), np.empty(0), np.empty(0)
-    seen, hidden, turns = np.empty(0, np.bool_), np.empty(0, np.bool_), np.empty(0, np.int64)
+    seen, hidden, turns = np.empty(0, np.bool_), np.empty(0, np.bool_), np.empty(0, np.int32)
     for frame in range(len(Ts_world_camera)):
         T, used = Ts_world_camera[frame], 0
         place_bounds(T, shapes, depth, within)
@@ -622,7 +633,7 @@ def visible_shares(
                     place_shape(T, shapes, c, near, within[c], placed)
                     starts[c], is_placed[c] = used, True
                     if placed.kinds[c] == OUTSIDE:
-                        pieces, used = contour(lens, view.limit, view.bend, shapes, c, placed, pieces, used)
+                        pieces, used = contour(lens, view, shapes, c, placed, pieces, used)
                     ends[c] = used
             by_depth = ends[b] == starts[b]
             for k in range(n):
@@ -643,8 +654,20 @@ def visible_shares(
                     xs, ys, own, other = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
                     seen, hidden = np.empty(size, np.bool_), np.empty(size, np.bool_)
                 if size + rows > len(turns):
-                    turns = np.empty(2 * (size + rows), np.int64)
-                grid = Grid(u0 + 0.5 * du, v0 + 0.5 * dv, du, dv, rows, columns)
+                    turns = np.empty(2 * (size + rows), np.int32)
+                # Depths are looked at only where the boxes of others meet the shape's, if its contour tells the rest.
+                first_row, end_row, first_column, end_column = rows, 0, columns, 0
+                for k in range(n):
+                    if not parted[k]:
+                        c = others[k]
+                        first_row = min(first_row, max(math.floor((bbox[frame, c, 1] - v0) / dv), 0))
+                        end_row = max(end_row, min(math.ceil((bbox[frame, c, 3] - v0) / dv), rows))
+                        first_column = min(first_column, max(math.floor((bbox[frame, c, 0] - u0) / du), 0))
+                        end_column = max(end_column, min(math.ceil((bbox[frame, c, 2] - u0) / du), columns))
+                if ends[b] == starts[b]:
+                    first_row, end_row, first_column, end_column = 0, rows, 0, columns
+                u, v = u0 + 0.5 * du, v0 + 0.5 * dv
+                grid = Grid(u, v, du, dv, rows, columns, first_row, end_row, first_column, end_column)
                 seen[:size], hidden[:size] = False, False
                 if by_depth:
                     cast_grid(rays, spacing, u0, v0, du, dv, rows, columns, xs, ys)
@@ -717,7 +740,7 @@ def instances(
                         ray = i * columns + j
                         xs[ray], ys[ray] = rays[0, row + i, column + j], rays[1, row + i, column + j]
                         drawn[ray] = 0.0
-                grid = Grid(column + 0.5, row + 0.5, 1.0, 1.0, rows, columns)
+                grid = Grid(column + 0.5, row + 0.5, 1.0, 1.0, rows, columns, 0, rows, 0, columns)
                 draw_shape(shapes, placed, b, near, grid, xs, ys, drawn)
                 for i in range(rows):
                     for j in range(columns):

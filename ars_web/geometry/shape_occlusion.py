@@ -75,9 +75,11 @@ def view_of(camera: Camera) -> View:
     rays, tables = rays_of_camera(camera), lens_tables(camera)
     x, y = rays[:, np.isfinite(rays).all(axis=0)]
     radius = float(np.hypot(x, y).max(initial=0.0))
-    limit = min(raster_kernels.MARGIN * radius, (1 - 1e-9) * tables.lens.rim)
+    rim = (1 - 1e-9) * tables.lens.rim
+    limit = min(raster_kernels.MARGIN * radius, rim)
+    bend, rim_bend = tables.bends_within(np.array([limit, rim])).tolist()
     # Between the rays there are others that go a little further.
     more = 0.05 * radius
     bounds = (x.min(initial=0.0), x.max(initial=0.0), y.min(initial=0.0), y.max(initial=0.0))
     sides = (float(side) + sign * more for side, sign in zip(bounds, (-1, 1, -1, 1), strict=True))
-    return View(limit**2, float(tables.bends_within(np.array([limit]))[0]), *sides)
+    return View(limit**2, bend, rim**2, rim_bend, *sides)
