@@ -72,14 +72,13 @@ def instance_masks(
         BadInput: there are not as many meshes as boxes.
     """
     shapes = _shapes(tuple(boxes), tuple(meshes))
-    visible, crops = np.empty((camera.height, camera.width), np.int16), np.empty((len(boxes), 4), np.int64)
+    visible, crops = np.empty((camera.height, camera.width), np.int16), np.empty((len(boxes), 5), np.int64)
     T = np.array(T_world_camera, dtype=np.float64, order="C")
     lens, (rays, bounds) = lens_tables(camera).lens, rays_of_pixels(camera)
     pixels = raster_kernels.instances(T, lens, view_of(camera), shapes, NEAR, rays, bounds, TILE, visible, crops)
-    parts = np.split(pixels, np.cumsum(crops[:, 2] * crops[:, 3])[:-1]) if len(boxes) else []
     silhouettes = [
-        Silhouette(row, column, part.reshape(rows, columns))
-        for part, (row, column, rows, columns) in zip(parts, crops.tolist(), strict=True)
+        Silhouette(row, column, pixels[start : start + rows * columns].reshape(rows, columns))
+        for row, column, rows, columns, start in crops.tolist()
     ]
     return InstanceMasks(visible, tuple(silhouettes))
 

@@ -232,21 +232,27 @@ def place_shape(T_world_camera: Array, shapes: Shapes, b: int, near: float, with
     r10, r11, r12 = T_world_camera[0, 1], T_world_camera[1, 1], T_world_camera[2, 1]
     r20, r21, r22 = T_world_camera[0, 2], T_world_camera[1, 2], T_world_camera[2, 2]
     px, py, pz = T_world_camera[0, 3], T_world_camera[1, 3], T_world_camera[2, 3]
-    vertices, points, planes, cut = shapes.vertices, placed.points, shapes.planes, False
-    # Short loops that each do one thing: the processor takes several vertices at a time.
-    for i in range(shapes.first_vertex[b], shapes.first_vertex[b + 1]):
-        x, y, z = vertices[0, i] - px, vertices[1, i] - py, vertices[2, i] - pz
-        points[0, i] = r00 * x + r01 * y + r02 * z
-        points[1, i] = r10 * x + r11 * y + r12 * z
-        points[2, i] = r20 * x + r21 * y + r22 * z
-    for i in range(shapes.first_vertex[b], shapes.first_vertex[b + 1]):
-        cut |= points[2, i] < near
-    placed.kinds[b] = CUT if cut else OUTSIDE
+    start, end = shapes.first_vertex[b], shapes.first_vertex[b + 1]
+    xs, ys, zs = shapes.vertices[0][start:end], shapes.vertices[1][start:end], shapes.vertices[2][start:end]
+    X, Y, Z = placed.points[0][start:end], placed.points[1][start:end], placed.points[2][start:end]
+    # Short loops that count from 0 and do one thing each: the processor takes several vertices at a time.
+    for i in range(len(xs)):
+        x, y, z = xs[i] - px, ys[i] - py, zs[i] - pz
+        X[i] = r00 * x + r01 * y + r02 * z
+        Y[i] = r10 * x + r11 * y + r12 * z
+        Z[i] = r20 * x + r21 * y + r22 * z
+    cut = 0
+    for i in range(len(Z)):
+        cut += 1 if Z[i] < near else 0
+    placed.kinds[b] = CUT if cut > 0 else OUTSIDE
     if within and surrounds(T_world_camera, shapes, b):
         placed.kinds[b] = ROUND
-    elif not cut:
-        for f in range(shapes.first_face[b], shapes.first_face[b + 1]):
-            placed.front[f] = planes[0, f] * px + planes[1, f] * py + planes[2, f] * pz + planes[3, f] > 0.0
+    elif cut == 0:
+        start, end = shapes.first_face[b], shapes.first_face[b + 1]
+        nx, ny, nz = shapes.planes[0][start:end], shapes.planes[1][start:end], shapes.planes[2][start:end]
+        d, front = shapes.planes[3][start:end], placed.front[start:end]
+        for f in range(len(d)):
+            front[f] = nx[f] * px + ny[f] * py + nz[f] * pz + d[f] > 0.0
 
 
 @part
@@ -268,12 +274,15 @@ def beside(
 def place_images(lens: Lens, view: View, near: float, shapes: Shapes, b: int, placed: Placed) -> None:
     """What `draw` needs of a shape that is placed: where in the image its faces may be met."""
     points, image, nearness, faces, limit = placed.points, placed.image, placed.nearness, shapes.faces, view.limit
-    for i in range(shapes.first_vertex[b], shapes.first_vertex[b + 1]):
-        inverse = 1.0 / max(points[2, i], AHEAD)
-        x, y = points[0, i] * inverse, points[1, i] * inverse
+    start, end = shapes.first_vertex[b], shapes.first_vertex[b + 1]
+    X, Y, Z = points[0][start:end], points[1][start:end], points[2][start:end]
+    U, V, near_by = image[0][start:end], image[1][start:end], nearness[start:end]
+    for i in range(len(X)):
+        inverse = 1.0 / max(Z[i], AHEAD)
+        x, y = X[i] * inverse, Y[i] * inverse
         u, v = image_point(lens, x, y)
-        image[0, i] = u if (points[2, i] > AHEAD) & (x * x + y * y < limit) else np.nan
-        image[1, i], nearness[i] = v, inverse * inverse
+        U[i] = u if (Z[i] > AHEAD) & (x * x + y * y < limit) else np.nan
+        V[i], near_by[i] = v, inverse * inverse
     # On the normalised plane a side is as long as in space times sqrt(1 + r^2) / z, at most.
     bend, outside = 0.125 * view.bend * (1.0 + limit), placed.kinds[b] == OUTSIDE
     listed, reach, n = placed.listed, placed.reach, shapes.first_face[b]
@@ -305,21 +314,24 @@ def contour(lens: Lens, view: View, shapes: Shapes, b: int, placed: Placed, piec
 
     The sum of the edges' turns round a ray is how often the ray enters the shape (contour_kernels.py).
     """
-    points, edges, front, start = placed.points, shapes.edges, placed.front, k
-    for e in range(shapes.first_edge[b], shapes.first_edge[b + 1]):
-        if front[edges[2, e]] == front[edges[3, e]]:
+    points, front, start = placed.points, placed.front, k
+    first, end = shapes.first_edge[b], shapes.first_edge[b + 1]
+    starts, ends = shapes.edges[0][first:end], shapes.edges[1][first:end]
+    along, back = shapes.edges[2][first:end], shapes.edges[3][first:end]
+    for e in range(len(along)):
+        if front[along[e]] == front[back[e]]:
             continue
-        i, j = edges[0, e], edges[1, e]
-        if not front[edges[2, e]]:
+        i, j = starts[e], ends[e]
+        if not front[along[e]]:
             i, j = j, i
-        x0, y0 = points[0, i] / points[2, i], points[1, i] / points[2, i]
-        x1, y1 = points[0, j] / points[2, j], points[1, j] / points[2, j]
+        near_i, near_j = 1.0 / points[2, i], 1.0 / points[2, j]
+        x0, y0, x1, y1 = points[0, i] * near_i, points[1, i] * near_i, points[0, j] * near_j, points[1, j] * near_j
         furthest = max(x0 * x0 + y0 * y0, x1 * x1 + y1 * y1)
         if furthest >= view.rim:
             return pieces, start
         bend = view.bend if furthest <= view.limit else view.rim_bend
         off = 0.125 * bend * ((x1 - x0) ** 2 + (y1 - y0) ** 2)
-        n = max(math.ceil(math.sqrt(off / STRAIGHT)), 1)
+        n = math.ceil(math.sqrt(off / STRAIGHT)) if off > STRAIGHT else 1
         if k + n > len(pieces):
             more = np.empty((2 * (k + n), 4))
             more[:k] = pieces[:k]
@@ -357,10 +369,10 @@ def cover(pieces: Array, grid: Grid, turns: Array, covered: Array) -> None:
             place = min(max(column + (i - row) * slope, 0.0), float(columns))
             turns[i * wide + math.ceil(place)] += turn
     for i in range(rows):
-        around = 0
-        for j in range(columns):
-            around += turns[i * wide + j]
-            covered[i * columns + j] |= around != 0
+        around, line, marks = 0, turns[i * wide : (i + 1) * wide], covered[i * columns : (i + 1) * columns]
+        for j in range(len(marks)):
+            around += line[j]
+            marks[j] |= around != 0
 
 
 @part
@@ -562,19 +574,25 @@ def cast_grid(
     start = min(max(int(u0 / spacing), 0), rays.shape[2] - 2)
     end = min(max(int((u0 + columns * du) / spacing), 0), rays.shape[2] - 2) + 2
     line_x, line_y = np.empty(end - start), np.empty(end - start)
+    left, right = np.empty(columns, np.uint32), np.empty(columns)
+    for j in range(columns):
+        place = (u0 + (j + 0.5) * du) / spacing
+        column = min(max(int(place), start), end - 2)
+        left[j], right[j] = column - start, place - column
     for i in range(rows):
         place = (v0 + (i + 0.5) * dv) / spacing
         row = min(max(int(place), 0), rays.shape[1] - 2)
         down = place - row
+        over_x, under_x = rays[0, row][start:end], rays[0, row + 1][start:end]
+        over_y, under_y = rays[1, row][start:end], rays[1, row + 1][start:end]
         for j in range(end - start):
-            line_x[j] = rays[0, row, start + j] + down * (rays[0, row + 1, start + j] - rays[0, row, start + j])
-            line_y[j] = rays[1, row, start + j] + down * (rays[1, row + 1, start + j] - rays[1, row, start + j])
+            line_x[j] = over_x[j] + down * (under_x[j] - over_x[j])
+            line_y[j] = over_y[j] + down * (under_y[j] - over_y[j])
+        x, y = xs[i * columns : (i + 1) * columns], ys[i * columns : (i + 1) * columns]
         for j in range(columns):
-            place = (u0 + (j + 0.5) * du) / spacing
-            k = min(max(int(place), start), end - 2) - start
-            right = place - (k + start)
-            xs[i * columns + j] = line_x[k] + right * (line_x[k + 1] - line_x[k])
-            ys[i * columns + j] = line_y[k] + right * (line_y[k + 1] - line_y[k])
+            k = left[j]
+            x[j] = line_x[k] + right[j] * (line_x[k + 1] - line_x[k])
+            y[j] = line_y[k] + right[j] * (line_y[k + 1] - line_y[k])
 
 
 @entry
@@ -683,10 +701,10 @@ def visible_shares(
                     for ray in range(size):
                         seen[ray] = own[ray] > 0.0
                 met, left = 0, 0
+                for ray in range(size if by_depth else 0):
+                    # The rays that only the contour's chords hold have no depth, and are not hidden.
+                    hidden[ray] |= (own[ray] > 0.0) & (other[ray] > own[ray] * NEARER)
                 for ray in range(size):
-                    if by_depth:
-                        # The rays that only the contour's chords hold have no depth, and are not hidden.
-                        hidden[ray] |= (own[ray] > 0.0) & (other[ray] > own[ray] * NEARER)
                     met += 1 if seen[ray] else 0
                     left += 1 if seen[ray] & (not hidden[ray]) else 0
                 if met > 0:
@@ -708,8 +726,8 @@ def instances(
     crops: Array,
 ) -> Array:
     """The nearest shape at the middle of each pixel, written to `visible` (h, w), -1 where none is, and where each
-    shape's silhouette is, written to `crops` (b, 4): first row, first column, rows and columns; answered are the
-    silhouettes' pixels, one after the other, row by row.
+    shape's silhouette is, written to `crops` (b, 5): first row, first column, rows, columns, and where it begins in
+    the answer: the silhouettes' pixels, row by row.
 
     `rays` (2, h, w) are those of the pixels' middles. Pixels are looked at in tiles of `tile` x `tile`, whose rays are
     within `bounds` (4, k, l): the least and largest x, and the least and largest y.
@@ -722,11 +740,21 @@ def instances(
     pixels, used = np.empty(height * width, np.bool_), 0
     touched = np.empty(bounds.shape[1:], np.bool_)
     visible[:] = -1
+    crops[:] = 0
+    rounds = 0
     for b in range(boxes):
-        crops[b] = 0
-        if depth[b, 1] < near:
+        if depth[b, 1] >= near:
+            place_shape(T_world_camera, shapes, b, near, within[b], placed)
+            rounds += 1 if placed.kinds[b] == ROUND else 0
+    # A shape round the camera hides nothing: all others come first, and it cannot be nearer than they are.
+    for k in range(2 * boxes if rounds else boxes):
+        b = k % boxes
+        if k == boxes:
+            for i in range(height):
+                for j in range(width):
+                    nearest[i, j] = np.inf if visible[i, j] >= 0 else 0.0
+        if depth[b, 1] < near or (placed.kinds[b] == ROUND) != (k >= boxes):
             continue
-        place_shape(T_world_camera, shapes, b, near, within[b], placed)
         place_images(lens, view, near, shapes, b, placed)
         touch(shapes, placed, b, tile, bounds, touched)
         low_row, low_column, high_row, high_column = height, width, -1, -1
@@ -735,20 +763,23 @@ def instances(
                 if not touched[row // tile, column // tile]:
                     continue
                 rows, columns = min(tile, height - row), min(tile, width - column)
+                drawn[: rows * columns] = 0.0
                 for i in range(rows):
-                    for j in range(columns):
-                        ray = i * columns + j
-                        xs[ray], ys[ray] = rays[0, row + i, column + j], rays[1, row + i, column + j]
-                        drawn[ray] = 0.0
+                    xs[i * columns : (i + 1) * columns] = rays[0, row + i][column : column + columns]
+                    ys[i * columns : (i + 1) * columns] = rays[1, row + i][column : column + columns]
                 grid = Grid(column + 0.5, row + 0.5, 1.0, 1.0, rows, columns, 0, rows, 0, columns)
                 draw_shape(shapes, placed, b, near, grid, xs, ys, drawn)
                 for i in range(rows):
-                    for j in range(columns):
-                        met = drawn[i * columns + j]
-                        layer[row + i, column + j] = met
-                        if met > 0.0:
-                            low_row, high_row = min(low_row, row + i), max(high_row, row + i)
-                            low_column, high_column = min(low_column, column + j), max(high_column, column + j)
+                    line = drawn[i * columns : (i + 1) * columns]
+                    layer[row + i][column : column + columns] = line
+                    first, last = 0, columns - 1
+                    while first < columns and line[first] == 0.0:
+                        first += 1
+                    if first < columns:
+                        while line[last] == 0.0:
+                            last -= 1
+                        low_row, high_row = min(low_row, row + i), max(high_row, row + i)
+                        low_column, high_column = min(low_column, column + first), max(high_column, column + last)
         if high_row < 0:
             continue
         rows, columns = high_row + 1 - low_row, high_column + 1 - low_column
@@ -757,15 +788,17 @@ def instances(
             more = np.empty(2 * (used + rows * columns), np.bool_)
             more[:used] = pixels[:used]
             pixels = more
+        crops[b, 4] = used
         for i in range(low_row, high_row + 1):
-            for j in range(low_column, high_column + 1):
-                met = layer[i, j] if touched[i // tile, j // tile] else 0.0
-                other = visible[i, j]
-                pixels[used] = met > 0.0
-                used += 1
-                # A shape round the camera hides nothing: all others are before it.
-                behind = placed.kinds[b] == ROUND and other >= 0 and placed.kinds[other] != ROUND
-                before = other >= 0 and placed.kinds[b] != ROUND and placed.kinds[other] == ROUND
-                if met > 0.0 and not behind and (before or met > nearest[i, j] * NEARER):
-                    nearest[i, j], visible[i, j] = met, b
+            line, before = layer[i][low_column : high_column + 1], nearest[i][low_column : high_column + 1]
+            seen, mask = visible[i][low_column : high_column + 1], pixels[used : used + columns]
+            for j in range(len(line)):
+                mask[j] = line[j] > 0.0
+                nearer = line[j] > before[j] * NEARER
+                before[j] = line[j] if nearer else before[j]
+                seen[j] = b if nearer else seen[j]
+            used += columns
+        # Tiles that the next shape does not touch must hold nothing of this one.
+        for i in range(low_row, high_row + 1):
+            layer[i][low_column : high_column + 1] = 0.0
     return pixels[:used].copy()

@@ -142,9 +142,9 @@ def kernel_shapes(stack: ShapeStack) -> Shapes:
     sides = np.max([((b - a) ** 2).sum(axis=1), ((c - b) ** 2).sum(axis=1), ((a - c) ** 2).sum(axis=1)], axis=0)
     return Shapes(
         np.ascontiguousarray(stack.vertices.T),
-        np.ascontiguousarray(stack.faces.T),
+        np.ascontiguousarray(stack.faces.T, dtype=np.uint32),
         np.ascontiguousarray(stack.planes.T),
-        np.ascontiguousarray(stack.edges.T),
+        np.ascontiguousarray(stack.edges.T, dtype=np.uint32),
         sides,
         stack.first_vertex.copy(),
         stack.first_face.copy(),
