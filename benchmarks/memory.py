@@ -4,20 +4,24 @@
 
 Labels alone, without images: with images, each worker holds one at a time besides. Each export runs in a process of
 its own with two workers. `session` is the coordinator before the export: the program and the session's frames; `peak`
-is its most; `worker` is the most that one of its workers took. What grows with the frames is the plan (names, poses),
-in the coordinator alone; all else is bounded by a shard.
+is its most; `worker` is the most that one of its workers took. What grows with the frames is the session and the plan
+(names, poses), in the coordinator alone; all else is bounded by a shard. Linux only: /proc tells each process's most.
 """
 
 import argparse
 import json
-import resource
+import re
 import subprocess
 import sys
 import tempfile
+import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
+import psutil
 import scene
 
 from ars_web.datasets.jobs import plan_export, run_export
@@ -39,24 +43,52 @@ def snapshot_of(n: int) -> SessionSnapshot:
     return SessionSnapshot("bench", state, {0: camera}, frames)
 
 
-def peak(who: int) -> float:
-    """The most memory so far, in MiB."""
-    return resource.getrusage(who).ru_maxrss * 1024 / MIB
+def peak(process: int | str = "self") -> float:
+    """The most memory that a process had so far, in MiB; 0 where it is gone.
+
+    getrusage tells of a child no less than its parent had when it was started.
+    """
+    try:
+        status = Path(f"/proc/{process}/status").read_text()
+    except (FileNotFoundError, ProcessLookupError):
+        return 0.0
+    found = re.search(r"VmHWM:\s+(\d+) kB", status)
+    return int(found[1]) * 1024 / MIB if found else 0.0
+
+
+@contextmanager
+def watching_workers() -> Iterator[list[float]]:
+    """The most that any process below this one takes within the block, in MiB, as the list's only entry."""
+    most, ended = [0.0], threading.Event()
+    own = psutil.Process()
+
+    def watch() -> None:
+        while not ended.wait(0.1):
+            most[0] = max([*most, *(peak(child.pid) for child in own.children(recursive=True))])
+
+    watcher = threading.Thread(target=watch)
+    watcher.start()
+    try:
+        yield most
+    finally:
+        ended.set()
+        watcher.join()
 
 
 def one(kind: str, n: int, folder: Path) -> dict[str, float]:
     snapshot = snapshot_of(n)
-    session = peak(resource.RUSAGE_SELF)
+    session = peak()
     plan = plan_export([snapshot], format=kind, options=ExportOptions.model_validate({"images": "none"}), out=folder)
     start = time.perf_counter()
-    report = run_export(plan, workers=2)
+    with watching_workers() as worker:
+        report = run_export(plan, workers=2)
     return {
         "seconds": time.perf_counter() - start,
         "labels": sum(split.labels for split in report.splits.values()),
         "shards": len(plan.shards),
         "session": session,
-        "peak": peak(resource.RUSAGE_SELF),
-        "worker": peak(resource.RUSAGE_CHILDREN),
+        "peak": peak(),
+        "worker": worker[0],
     }
 
 
