@@ -1,6 +1,6 @@
-"""Makes docs/workspace.png, the README's picture, in a real browser: python docs/workspace.py
+"""Makes the README's pictures, docs/workspace.png and docs/export.jpg, in a real browser: python docs/workspace.py
 
-Needs what `make test` needs. The picture is of the demo's session, at the mug, with nothing drawn in afterwards.
+Needs what `make test` needs. They are of the demo's session, with nothing drawn in afterwards.
 """
 
 import os
@@ -14,6 +14,7 @@ from pathlib import Path
 from playwright.sync_api import sync_playwright
 
 PICTURE = Path(__file__).with_name("workspace.png")
+EXPORT = Path(__file__).with_name("export.jpg")
 SIZE = {"width": 1440, "height": 900}
 FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 
@@ -28,7 +29,9 @@ def main() -> None:
             login = next(found[0] for line in server.stdout if (found := re.search(r"http://\S+/login\?\S+", line)))
             with sync_playwright() as playwright:
                 browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
-                take(browser.new_page(viewport=SIZE, color_scheme="dark"), login)
+                page = browser.new_page(viewport=SIZE, color_scheme="dark")
+                take(page, login)
+                take_export(page)
                 browser.close()
         finally:
             server.terminate()
@@ -49,6 +52,16 @@ def take(page, login: str) -> None:
     )
     page.wait_for_timeout(4000)  # thumbnails and the photo, drawn in software
     page.screenshot(path=PICTURE)
+
+
+def take_export(page) -> None:
+    """Choose a format in export mode, and take the picture once it is counted and drawn."""
+    page.get_by_role("tab", name="Export").click()
+    page.get_by_role("radio", name="YOLO, outlines").check()
+    page.locator('.format-picture img[data-format="yolo-seg"][data-stale="false"]').wait_for(timeout=120_000)
+    page.locator('.figures[data-stale="false"]').wait_for(timeout=120_000)
+    page.wait_for_timeout(2000)  # thumbnails
+    page.screenshot(path=EXPORT, type="jpeg", quality=80)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 import { html } from "../../lib/view.js";
 import { boxes, classes, mode } from "../../store.js";
 import { changes, options, reset, setOption, valueOf } from "./draft.js";
-import { many, REASONS } from "./words.js";
+import { capital, many, REASONS } from "./words.js";
 
 /** @typedef {import("../../store.js").Schemas["Forecast"]} Forecast */
 /** @typedef {{id: string, text: string, remedy: {words: string, act: () => void} | null}} Warning */
@@ -20,7 +20,7 @@ export function Advice({ found }) {
       </li>`,
     )}
     ${found.losses.length > 0 &&
-    html`<li key="losses" data-warning="losses"><div>${found.losses.map((text) => html`<p key=${text} class="problem">${text}</p>`)}</div></li>`}
+    html`<li key="losses" data-warning="losses"><div>${found.losses.map((text) => html`<p key=${text} class="problem">${capital(text)}</p>`)}</div></li>`}
   </ul>`;
 }
 

@@ -5,7 +5,7 @@ import { ago } from "../../lib/time.js";
 import { html, signal, useEffect, useRef, useSignal } from "../../lib/view.js";
 import { actions } from "../../store.js";
 import { writers } from "./draft.js";
-import { duration, figure, many, optionsWords, size, SPLITS } from "./words.js";
+import { capital, duration, figure, many, optionsWords, size, SPLITS } from "./words.js";
 
 /** @typedef {import("../../store.js").Export} Export */
 /** @typedef {import("../../store.js").Schemas["ExportReport"]} Report */
@@ -164,7 +164,7 @@ function State({ one }) {
   // Those of older programs do not say.
   const losses = report?.losses ?? [];
   return html`<p class="counts-words">${countsWords(report)}</p>
-    ${losses.length > 0 && html`<ul class="losses" aria-label="What it does not hold">${losses.map((text) => html`<li key=${text} class="problem">${text}</li>`)}</ul>`}`;
+    ${losses.length > 0 && html`<ul class="losses" aria-label="What it does not hold">${losses.map((text) => html`<li key=${text} class="problem">${capital(text)}</li>`)}</ul>`}`;
 }
 
 /** @param {Report | null} report */
