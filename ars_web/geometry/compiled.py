@@ -1,7 +1,7 @@
 """How the loops in `*_kernels.py` are compiled: when first called, without checks for division by zero.
 
 numba's cache notices a change only in the file of the `entry` that it keeps, so kernels call only kernels of their
-own file.
+own file; where that would be too long, the entries' file holds digests of the others, as `raster_kernels.py` does.
 """
 
 from numba import njit

@@ -14,6 +14,7 @@ from ars_web.geometry.camera import Camera
 from ars_web.geometry.labels import NEAR
 from ars_web.geometry.lens import lens_tables
 from ars_web.geometry.mesh import Mesh
+from ars_web.geometry.raster_records import Shapes
 from ars_web.geometry.rigid_transform import Transform
 from ars_web.geometry.shape_occlusion import view_of
 from ars_web.geometry.shape_stack import kernel_shapes, stack_shapes
@@ -84,7 +85,7 @@ def instance_masks(
 
 
 @lru_cache(maxsize=4)
-def _shapes(boxes: tuple[Box, ...], meshes: tuple[Mesh | None, ...]) -> raster_kernels.Shapes:
+def _shapes(boxes: tuple[Box, ...], meshes: tuple[Mesh | None, ...]) -> Shapes:
     return kernel_shapes(stack_shapes(boxes, meshes))
 
 

@@ -15,7 +15,7 @@ from ars_web.geometry.labels import NEAR
 from ars_web.geometry.lens import lens_tables
 from ars_web.geometry.mesh import Mesh
 from ars_web.geometry.occlusion import BLOCK, FEWEST_RAYS, RAY_SPACING, rays_of_camera, visible_fractions
-from ars_web.geometry.raster_kernels import View
+from ars_web.geometry.raster_records import MARGIN, View
 from ars_web.geometry.shape_stack import kernel_shapes, stack_shapes
 
 
@@ -76,7 +76,7 @@ def view_of(camera: Camera) -> View:
     x, y = rays[:, np.isfinite(rays).all(axis=0)]
     radius = float(np.hypot(x, y).max(initial=0.0))
     rim = (1 - 1e-9) * tables.lens.rim
-    limit = min(raster_kernels.MARGIN * radius, rim)
+    limit = min(MARGIN * radius, rim)
     bend, rim_bend = tables.bends_within(np.array([limit, rim])).tolist()
     # Between the rays there are others that go a little further.
     more = 0.05 * radius

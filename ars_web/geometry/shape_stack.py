@@ -11,7 +11,7 @@ from ars_web.errors import BadInput
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box
 from ars_web.geometry.mesh import Mesh
-from ars_web.geometry.raster_kernels import Shapes
+from ars_web.geometry.raster_records import Shapes
 
 BOX_FACES: Int[np.ndarray, "12 3"] = np.array(
     [
