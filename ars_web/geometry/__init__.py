@@ -30,6 +30,11 @@ Hulls
     known about what lies beyond. `visual_hull` intersects cones as closed meshes (`cone_intersection`), and where they
     share nothing, `view_disagreement` says which outlines are at fault and by how many pixels.
 
+Shapes
+    A shape of a scene is a box, or a closed mesh that stands in its place. What is seen of shapes behind each other is
+    told as shares (`shape_occlusion`; `occlusion` where all are boxes), as masks of pixels (`instance_masks`,
+    `run_lengths`) and for points (`hidden_points`). A shape with the camera inside hides nothing.
+
 Speed
     Modules named `*_kernels.py` hold numba's compiled loops over frames and boxes, and nothing else; the module beside
     them says what they are for. Nothing is compiled on import, and what is compiled is kept on disk. Long rows of

@@ -19,7 +19,7 @@ from ars_web.geometry.rigid_transform import Transform
 from ars_web.geometry.shape_occlusion import view_of
 from ars_web.geometry.shape_stack import kernel_shapes, stack_shapes
 
-TILE = 48
+TILE = 96
 """Pixels along the sides of the squares that are drawn at once: their depths stay in the processor's cache."""
 
 EDGES: tuple[tuple[np.ufunc, float], ...] = ((np.minimum, np.inf), (np.maximum, -np.inf))
