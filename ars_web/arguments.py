@@ -282,6 +282,21 @@ def export_options(given: Mapping[str, object]) -> "ExportOptions":
         raise _refused(error) from error
 
 
+def refuse_foreign_options(kind: str, given: Mapping[str, object]) -> None:
+    """Refuse what was given of options that mean something to other formats alone; None: not given.
+
+    Raises:
+        typer.BadParameter: it names the formats that the option is of.
+    """
+    from ars_web.datasets.registry import WRITERS
+
+    for name, value in given.items():
+        owners = [writer.format for writer in WRITERS.values() if name in writer.own_options]
+        if value is not None and owners and kind not in owners:
+            option = "--" + name.replace("_", "-")
+            raise typer.BadParameter(f"it is an option of {', '.join(owners)}, not of {kind}", param_hint=option)
+
+
 def server_settings(given: Mapping[str, object]) -> "Settings":
     """A server's settings by their names.
 

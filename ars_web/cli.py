@@ -237,6 +237,7 @@ def export(
 
     if kind not in WRITERS:
         raise typer.BadParameter(f"{kind!r} is none of {', '.join(WRITERS)}", param_hint="--format")
+    take.refuse_foreign_options(kind, {"masks": masks, "heading_bins": heading_bins})
     target = place(out)
     if check and not isinstance(target, Path):
         raise typer.BadParameter(
@@ -304,6 +305,7 @@ def preview(
     kind: Annotated[
         str | None, typer.Option("--format", metavar="FORMAT", help="Draw what this format holds of each label.")
     ] = None,
+    shape: take.Shape = None,
     sessions: take.Sessions = take.SESSIONS,
     as_json: take.Json = False,
 ) -> None:
@@ -313,7 +315,7 @@ def preview(
 
     with SessionStore(sessions) as store:
         snapshot = store.snapshot(store.find(session))
-    pictures = draw(snapshot, out, count=frames, format=kind)
+    pictures = draw(snapshot, out, count=frames, format=kind, shape=shape)
     if as_json:
         print_json(pictures)
     else:

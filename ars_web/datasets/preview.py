@@ -12,7 +12,7 @@ from ars_web.datasets.file_names import stems
 from ars_web.datasets.format_picture import draw_format
 from ars_web.datasets.options import ExportOptions
 from ars_web.datasets.samples import FrameLabel, frame_labels, labels_in_frames
-from ars_web.datasets.shapes import meshes_of
+from ars_web.datasets.shapes import check_shape, meshes_of
 from ars_web.errors import BadInput, NotFound, StoreError
 from ars_web.recordings.images import read_image
 from ars_web.recordings.stored_images import local
@@ -28,6 +28,7 @@ def preview(
     *,
     count: int = 6,
     format: str | None = None,  # noqa: A002 - the contract's name
+    shape: str | None = None,
 ) -> list[Path]:
     """Write `count` frames with their labels drawn into the folder `out`, as PNG; the files, in the frames' order.
 
@@ -35,24 +36,25 @@ def preview(
     evenly over those in which a box is seen; there may be fewer of them.
 
     Raises:
-        BadInput: no box of the session is in any of its images, or there is no such format.
+        BadInput: no box of the session is in any of its images, or there is no such format or shape.
         BadFile: one of the chosen images cannot be read.
         StoreError: `out` cannot be written.
     """
     if count < 1:
         raise BadInput(f"a preview of {count} frames shows nothing; ask for at least one")
+    check_shape(shape, [snapshot])
     indices = labelled_frames(snapshot)
     if not indices:
         boxes = len(snapshot.state.boxes)
         seen = f"none of its {boxes} boxes is in any image" if boxes else "it has no boxes"
         raise BadInput(f"session {snapshot.id} has nothing to draw: {seen}; put a box where the camera looked")
-    names, usual = stems(snapshot.frames.names), ExportOptions.model_validate({})
+    names, chosen = stems(snapshot.frames.names), ExportOptions.model_validate({"shape": shape})
     written: list[Path] = []
     for index in spread(indices, count):
         if format is None:
-            picture = draw_frame(snapshot, index)
+            picture = draw_frame(snapshot, index, shape=shape)
         else:
-            picture = draw_format(snapshot, index, format=format, options=usual)
+            picture = draw_format(snapshot, index, format=format, options=chosen)
         ok, content = cv2.imencode(".png", picture)
         assert ok, "OpenCV cannot encode PNG"
         path = out / f"{names[index]}.png"
@@ -85,12 +87,12 @@ def spread(indices: Sequence[int], count: int) -> list[int]:
     return [indices[(2 * i + 1) * len(indices) // (2 * count)] for i in range(count)]
 
 
-def draw_frame(snapshot: SessionSnapshot, index: int) -> UInt8[np.ndarray, "h w 3"]:
+def draw_frame(snapshot: SessionSnapshot, index: int, *, shape: str | None = None) -> UInt8[np.ndarray, "h w 3"]:
     """The frame's image (BGR, enlarged where it is small) with outlines, edges, boxes, names and shares visible."""
     if not 0 <= index < len(snapshot.frames):
         raise NotFound(f"session {snapshot.id} has no frame {index}; its frames are 0 to {len(snapshot.frames) - 1}")
     canvas = Canvas(read_image(local(snapshot.frames.images[index])))
-    labels = [label for label in frame_labels(snapshot, index) if label.bbox is not None]
+    labels = [label for label in frame_labels(snapshot, index, shape=shape) if label.bbox is not None]
     # Far boxes first: near ones are drawn over them, as they are seen.
     labels.sort(key=lambda label: -_distance(snapshot, index, label))
     colors = {label.box_id: color_of(snapshot.state.classes[label.class_id].color) for label in labels}

@@ -69,6 +69,17 @@ class Mesh:
         return np.column_stack([normals, offsets])
 
     @cached_property
+    def is_convex(self) -> bool:
+        """Whether no vertex lies outside of any face, but for a millionth of the mesh's size."""
+        planes, slack = self.planes, 2e-6 * self.sphere[1]
+        real = planes[np.isfinite(planes[:, 3])]
+        # Face by face in pieces: together they would be faces times vertices.
+        return all(
+            float((part[:, :3] @ self.vertices_world.T + part[:, 3:]).max(initial=-np.inf)) <= slack
+            for part in np.array_split(real, max(len(real) // 256, 1))
+        )
+
+    @cached_property
     def sphere(self) -> tuple[Float[np.ndarray, "3"], float]:
         """Centre and radius of a sphere round all vertices."""
         centre = (self.vertices_world.min(axis=0) + self.vertices_world.max(axis=0)) / 2

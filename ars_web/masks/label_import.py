@@ -1,6 +1,7 @@
 """Labels of another program brought into a session: poses say where a box is, outlines become masks and the box of
 their hull, rectangles the box that fits them."""
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,7 +19,7 @@ from ars_web.geometry.box_fit import BoxFit, fit_box
 from ars_web.geometry.box_sighting import Sighting
 from ars_web.geometry.hull_box import box_of_hull
 from ars_web.geometry.polygon import Polygon
-from ars_web.geometry.visual_hull import visual_hull
+from ars_web.geometry.visual_hull import angle_between, visual_hull
 from ars_web.masks.views import Photographs, camera_of, object_of, photographs, views_of
 from ars_web.recordings.options import NOTHING_SAID, ReadOptions
 from ars_web.sessions.editing import SessionEditor
@@ -31,6 +32,9 @@ from ars_web.sessions.store import SessionStore
 
 MOST_VIEWS = 24
 """Of an object's outlines, evenly spread, that count for its hull: more hardly make it smaller, only slower."""
+
+SMALL_ANGLE = math.radians(60.0)
+"""Between the views of an object's outlines that are furthest apart: from below it a hull is far too long."""
 
 FEWEST_RECTANGLES = 3
 """That a box is fitted to: two leave it open."""
@@ -227,10 +231,18 @@ def _of_outlines(taken: Photographs, one: PlannedObject) -> _Made:
     if len(counted) < 2:
         return _Made(without_box, None, "no box: it is outlined in one frame; outline it in another", ())
     outlines: list[tuple[int, tuple[Polygon, ...]]] = [(frame, one.outlines[frame]) for frame in sorted(counted)]
+    views = views_of(taken, outlines)
     try:
-        box, hull = object_of(views_of(taken, outlines), HULL_OPTIONS)
+        box, hull = object_of(views, HULL_OPTIONS)
     except BadInput as error:
         return _Made(without_box, None, f"no box: {error}", ())
+    angle = angle_between(views, box.T_world_box[:3, 3])
+    if angle < SMALL_ANGLE:
+        narrow = (
+            f"its outlines are from at most {math.degrees(angle):.0f} degrees apart: the box is far too long; outline"
+            " it from further round, or fit it with `boxes refine`"
+        )
+        note = f"{note}; {narrow}" if note else narrow
     return _Made(replace(without_box, box=box, hull=hull, hull_options=HULL_OPTIONS), "outlines", note, ())
 
 

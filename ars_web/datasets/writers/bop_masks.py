@@ -16,7 +16,7 @@ def write_masks(shard: Shard, info: BopInfo, files: Path) -> BopInfo:
     """Write the masks of the kept labels of a shard, and what `info` is by them. A frame's masks are in memory at
     once, not a shard's.
 
-    Objects whose labels are dropped hide others all the same. Of `bbox_obj` the sides beyond the image stay.
+    Objects whose labels are dropped hide others all the same. `bbox_obj` stays for objects that the image cuts.
     """
     shapes, (n, b) = shard.shapes, shard.keep.shape
     inside = pixel_box(shard.table.bbox, shard.sizes, canvas=0)
@@ -49,12 +49,9 @@ def write_masks(shard: Shard, info: BopInfo, files: Path) -> BopInfo:
             memoryview(b"".join(contents)),
             np.cumsum([0, *map(len, contents)]),
         )
-    first, last = info.bbox_obj[..., :2], info.bbox_obj[..., :2] + info.bbox_obj[..., 2:]
-    low, high = inside[..., :2], inside[..., :2] + inside[..., 2:]
-    first = np.where(first < 0, first, low)
-    last = np.where(last > shard.sizes[:, None] - 1, last, high)
     return BopInfo(
-        bbox_obj=np.concatenate([first, last - first], axis=-1),
+        # What is cut by one side of the image may reach furthest along the others outside of it, too.
+        bbox_obj=np.where((shard.table.truncated > 0)[..., None], info.bbox_obj, inside),
         bbox_visib=seen,
         px_all=whole_pixels(counts[0], shard.table.truncated, shard.sizes),
         px_valid=counts[0],

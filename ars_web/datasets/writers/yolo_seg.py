@@ -21,12 +21,12 @@ def _write(shard: Shard, files: Path, fragments: Path) -> FileDigests:
 
 
 def _losses(plan: ExportPlan) -> Sequence[str]:
-    shapes = sum(shape != "box" for session in plan.sessions for shape in session.drawn_round)
+    shapes = sum(mesh is not None and not mesh.is_convex for session in plan.sessions for mesh in session.meshes)
     if not shapes:
         return ()
     return (
-        f"pieces and holes of the outlines of {shapes} object{'s' if shapes > 1 else ''}: a row holds one ring, which"
-        " goes there and back on one line",
+        f"pieces and holes that outlines of {shapes} object{'s' if shapes > 1 else ''} may have: a row holds one ring,"
+        " which goes there and back on one line",
     )
 
 
