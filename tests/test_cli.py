@@ -149,6 +149,15 @@ def test_a_recording_becomes_a_training_set(run: Commands, recording: Path, tmp_
     assert all(Path(picture).read_bytes().startswith(b"\x89PNG") for picture in pictures)
 
 
+def test_a_set_is_read_back(shared: tuple[Commands, str], tmp_path: Path) -> None:
+    run, session = shared
+    printed = run("export", session, "--format", "voc", "--out", tmp_path / "d", "--check").stdout
+    assert "counts that differ: none" in printed
+    assert "largest error: 0." in printed
+    found = json.loads(run("export", session, "--format", "yolo", "--out", tmp_path / "y", "--check", "--json").stdout)
+    assert (found["check"]["frames"], found["check"]["wrong_counts"]) == (FRAMES, 0)
+
+
 def test_import_prints_the_id_alone_and_names_skipped_frames(run: Commands, recording: Path) -> None:
     poses = (recording / "robot_poses.txt").read_text().splitlines()
     poses[2] = "nan 0 0 0 0 0 1"
@@ -243,6 +252,8 @@ def test_json_is_all_there_is_on_stdout(
         (("export", "SESSION", "--format", "yolo", "--out", "D", "--frames-list", "1", "--frames-step", "2"), "both"),
         (("export", "SESSION", "--format", "yolo", "--out", "D", "--split-train", "0.9"), "--split-train"),
         (("export", "SESSION", "--format", "yolo", "--out", "D", "--images", "steal"), "--images"),
+        (("export", "SESSION", "--format", "yolo", "--out", "D", "--heading-bins", "8"), "an option of compass"),
+        (("export", "SESSION", "--format", "yolo", "--out", "memory://a/b", "--check"), "not read back"),
         (("serve", "--root", "here"), "NAME=PATH"),
         (("serve", "--root", "a=.", "--root", "a=."), "'a'"),
         (("serve", "--root", "a=nowhere"), "nowhere"),

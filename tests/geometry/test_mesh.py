@@ -33,6 +33,15 @@ def test_all_vertices_lie_in_the_sphere():
     assert (np.linalg.norm(mesh.vertices_world - centre, axis=1) <= radius).all()
 
 
+def test_a_convex_mesh_is_known_by_its_faces():
+    assert Mesh(CORNERS, TETRAHEDRON).is_convex
+    dented = trimesh.creation.icosphere(subdivisions=2)
+    assert Mesh(dented.vertices, dented.faces).is_convex
+    vertices = dented.vertices.copy()
+    vertices[0] *= 0.9
+    assert not Mesh(vertices, dented.faces).is_convex
+
+
 def test_an_edge_of_four_faces_is_allowed():
     # Two tetrahedra that share one edge.
     other = CORNERS * [1, -1, -1]

@@ -302,6 +302,14 @@ def test_of_many_outlines_some_count_for_the_hull(coco, store: SessionStore, sid
     assert MOST_VIEWS > 12
 
 
+def test_outlines_from_sides_that_are_alike_are_told(coco, take) -> None:
+    made = take(coco(frames=2))
+    assert made.boxes == 2
+    for one in made.objects:
+        assert "its outlines are from at most 3" in one.note
+        assert "degrees apart: the box is far too long" in one.note
+
+
 def test_a_dry_run_says_the_same_and_stores_nothing(coco, store: SessionStore, sid: str, take) -> None:
     tried = take(coco(), dry_run=True)
     assert (tried.boxes, tried.masks, tried.revision) == (2, 12, None)

@@ -331,6 +331,8 @@ def test_silhouettes_beyond_the_image_are_counted(make_snapshot: Make, tmp_path:
                 # Of an outline's pixels those at its border may be in or out.
                 assert abs(exact[key] - estimated[key]) <= 2 + 0.3 * estimated[key]
             if exact["px_count_all"] > exact["px_count_valid"]:
+                # The whole object's, whichever sides of the image cut it.
+                assert exact["bbox_obj"] == estimated["bbox_obj"]
                 x, y, w, h = exact["bbox_obj"]
                 cut += x < 0 or y < 0 or x + w > 63 or y + h > 47
     assert cut
