@@ -6,8 +6,6 @@
 #   make format   let ruff put the format right
 
 PYTHON ?= python3
-# How the tests are spread: two processes, each file in one of them. `make test PROCESSES=` runs them in one.
-PROCESSES ?= -n 2 --dist loadgroup
 BIN := .venv/bin
 PINNED := pyproject.toml setup.py constraints.txt .ci/environment
 
@@ -17,8 +15,15 @@ PINNED := pyproject.toml setup.py constraints.txt .ci/environment
 demo: .venv/runtime.stamp
 	$(BIN)/ars-web demo
 
+# All of them in two steps: what needs no browser in two processes, each file in one of them; then what drives a
+# browser in one, because a second Chromium beside the first would only slow both. `make test ARGS="tests/api -q"` runs
+# some.
 test: .venv/dev.stamp
-	ARS_WEB_CHROMIUM="$$(.ci/chromium)" && export ARS_WEB_CHROMIUM && $(BIN)/python -m pytest $(PROCESSES) $(ARGS)
+	ARS_WEB_CHROMIUM="$$(.ci/chromium)" && export ARS_WEB_CHROMIUM && if [ -n "$(ARGS)" ]; then \
+	    $(BIN)/python -m pytest $(ARGS); \
+	else \
+	    $(BIN)/python -m pytest -n 2 --dist loadfile --ignore tests/browser && $(BIN)/python -m pytest tests/browser; \
+	fi
 
 check: .venv/dev.stamp
 	$(BIN)/ruff format --check .

@@ -153,14 +153,5 @@ def s3(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]:
         yield found
 
 
-@pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Where tests run in several processes, those of a file share one, and so do all that drive a browser: a second
-    Chromium beside the first would only slow both."""
-    for item in items:
-        in_browser = "browser" in item.path.relative_to(Path(__file__).parent).parts
-        item.add_marker(pytest.mark.xdist_group("browser" if in_browser else str(item.path)))
-
-
 def pytest_report_header() -> str:
     return f"recorded data: {SHARED if (SHARED / 'data').is_dir() else 'absent, tests/recorded/ is not collected'}"
