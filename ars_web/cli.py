@@ -282,7 +282,13 @@ def export(
         raise typer.Exit(INTERRUPTED) from None
     checked = compare(plan, plan.out) if check else None
     if as_json:
-        print_json({"out": str(target), "report": report.model_dump(mode="json"), "check": checked})
+        print_json(
+            {
+                "out": target if isinstance(target, Path) else str(target),
+                "report": report.model_dump(mode="json"),
+                "check": checked,
+            }
+        )
     else:
         rows = [(name, s.images, s.negatives, s.labels) for name, s in report.splits.items()]
         print_table(("split", "images", "without a label", "labels"), rows)

@@ -221,6 +221,8 @@ def test_export_takes_every_option(run: Commands, session: str, recording: Path,
         "min_visible": 0.1,
         "max_truncated": 0.9,
         "min_area_px": 5.0,
+        "masks": "write",
+        "heading_bins": 18,
         "split": {"train": 0.5, "val": 0.25, "test": 0.25, "by": "frame", "seed": 7},
         "sessions": [other],
     }
