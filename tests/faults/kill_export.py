@@ -39,7 +39,8 @@ def export(sessions: str, sid: str, out: str, kind: str) -> None:
     with SessionStore(Path(sessions)) as store:
         snapshot = store.snapshot(sid)
     plan = plan_export([snapshot], format=kind, options=OPTIONS, out=Path(out), frames_per_shard=10)
-    jobs.run_export(plan, workers=2)
+    # Of two shards that were begun it is not known which one killed its worker: both would have a second try.
+    jobs.run_export(plan, workers=1 if "--once" in sys.argv else 2)
 
 
 def serve(sessions: str, *wanted: str) -> None:
