@@ -44,7 +44,7 @@ READERS: dict[str, Reader] = {
 }
 
 
-def read_labels(path: Path, *, format: str = "auto", options: ReadOptions = NOTHING_SAID) -> ForeignLabels:  # noqa: A002
+def read_labels(path: Path, *, format: str = "auto", options: ReadOptions = NOTHING_SAID) -> ForeignLabels:  # noqa: A002 - the contract's name
     """Read the labels at `path`: a file, or a folder that holds one, or all parts of one set.
 
     Raises:
@@ -71,7 +71,7 @@ def _read(reader: Reader, file: Path, options: ReadOptions) -> ForeignLabels:
     return reader.read(file, options)
 
 
-def _of_one_set(path: Path, format: str) -> tuple[Reader, list[Path]]:  # noqa: A002
+def _of_one_set(path: Path, format: str) -> tuple[Reader, list[Path]]:  # noqa: A002 - the contract's name
     readers = list(READERS.values()) if format == "auto" else [READERS[format]]
     found = [(reader, file) for reader in readers for file in reader.find(path)]
     if not found and format != "auto" and path.is_file():

@@ -134,7 +134,7 @@ class LabelImport:
         sid: str,
         path: Path,
         *,
-        format: str = "auto",  # noqa: A002
+        format: str = "auto",  # noqa: A002 - the contract's name
         options: ReadOptions = NOTHING_SAID,
         dry_run: bool = False,
         author: str,

@@ -53,7 +53,7 @@ def detect_formats(path: Path) -> list[str]:
         return [key for key, reader in READERS.items() if reader.recognises(path)]
 
 
-def read_recording(path: Path, *, format: str = "auto", options: ReadOptions = NOTHING_SAID) -> Recording:  # noqa: A002
+def read_recording(path: Path, *, format: str = "auto", options: ReadOptions = NOTHING_SAID) -> Recording:  # noqa: A002 - the contract's name
     """Read the recording at `path` (a file or a folder).
 
     Raises:

@@ -64,7 +64,7 @@ def copy_image(image: Path | StoredImage, target: Path) -> None:
         shutil.copyfileobj(source, copy, length=1 << 20)
 
 
-def read_with_stored_images(path: Path, folder: StoreFolder, *, format: str, options: ReadOptions) -> Recording:  # noqa: A002
+def read_with_stored_images(path: Path, folder: StoreFolder, *, format: str, options: ReadOptions) -> Recording:  # noqa: A002 - the contract's name
     """Read the recording at `path`, whose images lie in the store's `folder`; raises as `read_recording` does.
 
     The readers look at a folder of stand-ins: files of the images' names and sizes, with their beginnings and ends.

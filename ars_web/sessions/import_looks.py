@@ -56,7 +56,7 @@ class ImportLooks:
         self._lock = threading.Lock()
         self._images: OrderedDict[str, Mapping[int, LookedImage]] = OrderedDict()
 
-    def look(self, path: Path, *, format: str = "auto", options: ReadOptions) -> Look:  # noqa: A002
+    def look(self, path: Path, *, format: str = "auto", options: ReadOptions) -> Look:  # noqa: A002 - the contract's name
         """Look at the recording at `path`. Where several formats are possible and none is said, the first that can
         be read is taken, and a warning says so.
 
