@@ -3,13 +3,15 @@ from an index."""
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from jaxtyping import Float
 
-from ars_web.datasets.readback.reader import Reader, ReadFrame, ReadLabel, Sizes
+from ars_web.datasets.readback.reader import Reader, ReadFrame, ReadLabel, ReadMask, Sizes
 from ars_web.datasets.readback.yolo import own_reading
 from ars_web.datasets.splits import SPLITS
 from ars_web.errors import BadFile
@@ -27,8 +29,23 @@ def _read(folder: Path, sizes: Sizes) -> Iterator[ReadFrame]:
             path = scene / "scene_gt.json"
             for image, labels in _document(path).items():
                 stem = f"{int(image):06d}"
-                found = tuple(_label(path, image, label, names, extents) for label in labels)
-                yield ReadFrame(stem, split, f"{path}, image {image}", found)
+                found = (_label(path, image, label, names, extents) for label in labels)
+                masked = tuple(_with_masks(scene, f"{stem}_{i:06d}.png", label) for i, label in enumerate(found))
+                yield ReadFrame(stem, split, f"{path}, image {image}", masked)
+
+
+def _with_masks(scene: Path, name: str, label: ReadLabel) -> ReadLabel:
+    """The label with its masks, where the dataset has some."""
+    if not (scene / "mask").is_dir():
+        return label
+    return replace(label, mask=_mask(scene / "mask" / name), visible_mask=_mask(scene / "mask_visib" / name))
+
+
+def _mask(path: Path) -> ReadMask:
+    pixels = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+    if pixels is None:
+        raise BadFile(path, "is missing, or no PNG")
+    return ReadMask(0, 0, pixels > 0)
 
 
 def _document(path: Path) -> dict[str, Any]:

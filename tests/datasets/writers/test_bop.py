@@ -15,6 +15,7 @@ from PIL import Image
 from ars_web.datasets.jobs import plan_export, run_export
 from ars_web.datasets.options import ExportOptions
 from ars_web.datasets.planned import ExportPlan, PlannedSession
+from ars_web.datasets.readback.comparison import compare
 from ars_web.datasets.samples import kept, label_table
 from ars_web.datasets.writers.bop import WRITER
 from ars_web.datasets.writers.bop_info import pixel_box, whole_pixels
@@ -416,3 +417,16 @@ def test_documents_have_one_image_a_line_as_the_toolkits(make_snapshot: Make, tm
         lines = (tmp_path / "d" / "train" / "000000" / f"scene_{name}.json").read_text().splitlines()
         assert (lines[0], lines[-1], len(lines)) == ("{", "}", 7)
         assert all(a.endswith(",") and not b.startswith(",") for a, b in pairwise(lines[1:-1]))
+
+
+def test_a_pixel_of_a_mask_that_is_off_is_counted(make_snapshot: Make, tmp_path: Path) -> None:
+    options = ExportOptions.model_validate({"images": "none", "masks": "write"})
+    plan = plan_export([make_snapshot(4, one_camera=True)], format="bop", options=options, out=tmp_path / "d")
+    run_export(plan)
+    assert compare(plan, plan.out).wrong_pixels == 0
+    path = next(iter(sorted((tmp_path / "d").glob("*/*/mask_visib/*.png"))))
+    pixels = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    pixels[0, 0] = 255 - pixels[0, 0]
+    assert cv2.imwrite(str(path), pixels)
+    found = compare(plan, plan.out)
+    assert (found.wrong_pixels, found.agrees) == (1, False)
