@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ars_web import arguments as take
-from ars_web import box_commands, class_commands, kernel_cache, label_commands
+from ars_web import box_commands, class_commands, judging_commands, kernel_cache, label_commands, study_commands
 from ars_web.errors import ArsError
 from ars_web.terminal import has_screen, note, open_browser, print_json, print_table, progress
 
@@ -43,6 +43,8 @@ app = typer.Typer(
 app.add_typer(box_commands.app, name="boxes")
 app.add_typer(class_commands.app, name="classes")
 app.add_typer(label_commands.app, name="labels")
+app.add_typer(study_commands.app)
+app.add_typer(judging_commands.app)
 
 
 @app.callback(invoke_without_command=True)

@@ -1,0 +1,1 @@
+"""How good detections are: true and predicted rectangles read, matched and scored."""

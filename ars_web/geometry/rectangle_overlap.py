@@ -1,0 +1,20 @@
+"""How far rectangles in an image share their area."""
+
+import numpy as np
+from jaxtyping import Float
+
+
+def pairwise_iou(first: Float[np.ndarray, "n 4"], second: Float[np.ndarray, "m 4"]) -> Float[np.ndarray, "n m"]:
+    """Intersection over union of every rectangle (x0, y0, x1, y1) of one list with every one of another.
+
+    It is 0 where both are empty.
+    """
+    corners = np.maximum(first[:, None, :2], second[None, :, :2])
+    ends = np.minimum(first[:, None, 2:], second[None, :, 2:])
+    common = np.clip(ends - corners, 0.0, None).prod(axis=-1)
+    union = _areas(first)[:, None] + _areas(second)[None, :] - common
+    return np.divide(common, union, out=np.zeros_like(common), where=union > 0)
+
+
+def _areas(rectangles: Float[np.ndarray, "n 4"]) -> Float[np.ndarray, "n"]:
+    return np.clip(rectangles[:, 2:] - rectangles[:, :2], 0.0, None).prod(axis=-1)

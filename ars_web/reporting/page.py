@@ -1,0 +1,62 @@
+"""A report as one HTML file that needs nothing beside it: what a template makes of values.
+
+What comes from data is escaped; there is no script in a report, and nothing in it points elsewhere.
+"""
+
+import base64
+import os
+import tempfile
+from functools import cache
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from ars_web import __version__
+
+
+def report_page(template: str, **values: object) -> str:
+    """What the template of that name under `templates/` makes of values; it extends `base.html`.
+
+    A value that the template wants and that is not there raises jinja2's UndefinedError: a template's mistake.
+    """
+    return _environment().get_template(template).render(version=__version__, **values)
+
+
+def write_page(page: str, file: Path) -> None:
+    """Write a page whole or not at all; its folder is made where it is missing.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    file.parent.mkdir(parents=True, exist_ok=True)
+    descriptor, partial = tempfile.mkstemp(dir=file.parent, prefix=f".{file.name}.")
+    try:
+        with os.fdopen(descriptor, "w", encoding="utf-8", errors="backslashreplace") as stream:
+            stream.write(page)
+        Path(partial).chmod(0o666 & ~_umask())
+        Path(partial).replace(file)
+    except BaseException:
+        Path(partial).unlink(missing_ok=True)
+        raise
+
+
+def data_uri(content: bytes, *, media_type: str) -> str:
+    """Bytes as an address that holds them, for an `img`."""
+    return f"data:{media_type};base64,{base64.b64encode(content).decode()}"
+
+
+@cache
+def _environment() -> Environment:
+    return Environment(
+        loader=PackageLoader("ars_web.reporting"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
