@@ -71,7 +71,8 @@ def _bad(path: Path, data: bytes, error: ValidationError) -> BadFile:
     if not place or not isinstance(place[0], int):
         return BadFile(path, "COCO results are a JSON list of {image_id, category_id, bbox, score}")
     row, what = place[0], ".".join(str(part) for part in place[1:2])
-    said = f"has no {what}" if first["type"] == "missing" else f"{what}: {first['msg']}" if what else first["msg"]
+    is_missing = first["type"] == "missing" and len(place) == 2
+    said = f"has no {what}" if is_missing else f"{what}: {first['msg']}" if what else first["msg"]
     # Results are found by what each begins with; where one lacks it, its line is not known.
     lines = line_of(data, b'"bbox"', count=data.count(b'"bbox"')) or []
     known = len(lines) > row and what != "bbox"
