@@ -44,7 +44,9 @@ TruthFormat = Annotated[
 NumberedClasses = Annotated[
     str | None,
     typer.Option(
-        "--classes", metavar="A,B,C", help="What the predictions' class numbers 0, 1, … mean; default: the truth's."
+        "--classes",
+        metavar="A,B,C",
+        help="What the predictions' class numbers 0, 1, … mean, - for none; default: the truth's.",
     ),
 ]
 ImageSize = Annotated[
@@ -57,6 +59,10 @@ ReportOut = Annotated[
     Path | None,
     typer.Option("--out", metavar="DIR|FILE.html", help="Write a report; into a folder with its plots and its JSON."),
 ]
+
+
+SLOW_FOR_COCO = 30_000
+"""Predictions beyond which one waits for pycocotools."""
 
 
 @app.command()
@@ -89,6 +95,8 @@ def evaluate(
         read_predictions(file, labels, name=name, format=kind, class_names=names)
         for name, file in map(_named_file, predictions)
     ]
+    if coco and sum(len(one.bbox) for one in detectors) > SLOW_FOR_COCO:
+        note("ars-web: COCO's numbers by pycocotools take a while; --no-coco leaves them out")
     evaluation = score(labels, detectors, iou=iou, coco=coco)
     for line in evaluation.warnings:
         note(f"ars-web: {line}")

@@ -51,6 +51,12 @@ def read(path: Path, into: PredictionsRead) -> None:
             into.refuse_without_pixels()
     except BadInput as error:
         raise BadFile(path, str(error)) from error
+    if into.truth.category_ids is None and not into.class_names and any(type(r.category_id) is int for r in results):
+        # COCO's own ids begin at 1, these numbers at 0: a shift would go unnoticed but for the last class.
+        into.warnings.append(
+            f"{path}: the truth is not COCO, so category_id is taken as a class's number ({into.numbered_classes});"
+            " where it means others, say --classes"
+        )
     for row, one in enumerate(results):
         x, y, width, height = one.bbox
         try:

@@ -92,8 +92,10 @@ def _joined(path: Path, files: list[Path], options: TruthOptions, split: str | N
         raise BadFile(files[0], "two of its categories have one name; name them apart")
     class_of = {id_: place for place, id_ in enumerate(ids)}
     places: dict[int, int] = {}
-    roots = [root for root in (_root(path), _root(path) / "images") if root.is_dir()]
     for file, content in zip(files, contents, strict=True):
+        root, part = _root(path), file.stem.removeprefix("instances_")
+        # COCO's own images of instances_val2017.json are in val2017/.
+        roots = [root, root / "images", root / part, root / "images" / part]
         for image in content.images:
             if image.id in places:
                 raise BadFile(file, f"image id {image.id} is there twice; ids tell images apart")

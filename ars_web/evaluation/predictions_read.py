@@ -10,6 +10,9 @@ from ars_web.errors import BadInput
 from ars_web.evaluation.detections import Predictions, Truth
 from ars_web.evaluation.image_names import ImageNames, stem_of
 
+UNUSED = "-"
+"""Among a detector's classes: a number that stands for none, such as 0 where they begin at 1."""
+
 _SHOWN = 8
 
 
@@ -19,7 +22,8 @@ class PredictionsRead:
 
     Attributes:
         truth: that images and classes are looked up in.
-        class_names: what the detector's class numbers mean, from 0; None: what the truth's numbers do.
+        class_names: what the detector's class numbers mean, from 0, UNUSED ones included; None: what the truth's do.
+        warnings: what is odd so far.
     """
 
     truth: Truth
@@ -28,6 +32,7 @@ class PredictionsRead:
     class_: list[int] = field(default_factory=list[int])
     rectangles: list[tuple[float, float, float, float]] = field(default_factory=list[tuple[float, float, float, float]])
     score: list[float] = field(default_factory=list[float])
+    warnings: list[str] = field(default_factory=list[str])
 
     def __post_init__(self) -> None:
         self._names = ImageNames([image.name for image in self.truth.images])
@@ -36,7 +41,8 @@ class PredictionsRead:
         self._coco_ids = {image.coco_id: i for i, image in enumerate(self.truth.images) if image.coco_id is not None}
         self._numbered: dict[int, int] = {}
         if class_names := self.class_names:
-            self._numbered = {number: self.class_named(name) for number, name in enumerate(class_names)}
+            said = [(number, name) for number, name in enumerate(class_names) if name != UNUSED]
+            self._numbered = {number: self.class_named(name) for number, name in said}
         elif self.truth.numbers is not None:
             self._numbered = {number: place for place, number in enumerate(self.truth.numbers)}
 
@@ -82,9 +88,14 @@ class PredictionsRead:
                 f"class {number}: the truth ({self.truth.format}) does not number its classes; say by --classes which"
                 " classes 0, 1, … are"
             )
+        raise BadInput(f"class {number} is none of {self.numbered_classes}")
+
+    @property
+    def numbered_classes(self) -> str:
+        """Which class each number is, for messages."""
         pairs = list(self._numbered.items())[:_SHOWN]
-        known = ", ".join(f"{n}: {self.truth.classes[place]}" for n, place in pairs)
-        raise BadInput(f"class {number} is none of {known}{', …' if len(self._numbered) > _SHOWN else ''}")
+        known = ", ".join(f"{number}: {self.truth.classes[place]}" for number, place in pairs)
+        return known + (", …" if len(self._numbered) > _SHOWN else "")
 
     def class_of_category(self, category: int | str) -> int:
         """The place of a category of COCO results: the truth's ids where that is COCO, else numbers or names."""
@@ -125,7 +136,7 @@ class PredictionsRead:
         image, class_ = np.array(self.image, dtype=np.int64), np.array(self.class_, dtype=np.int64)
         bbox = np.array(self.rectangles, dtype=np.float64).reshape(-1, 4)
         score = np.array(self.score, dtype=np.float64)
-        warnings: list[str] = []
+        warnings = [*self.warnings]
         if not len(bbox):
             warnings.append(f"{source}: holds no prediction; every label counts as missed")
         sides = bbox[:, 2:] - bbox[:, :2]

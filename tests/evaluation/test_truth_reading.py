@@ -129,6 +129,17 @@ def test_images_are_found_beside_the_labels(tmp_path: Path) -> None:
         assert truth.in_pixels
 
 
+def test_images_of_coco_itself_are_found(tmp_path: Path) -> None:
+    (tmp_path / "annotations").mkdir()
+    shutil.copy(
+        GOLDEN / "coco" / "annotations" / "instances_val.json", tmp_path / "annotations" / "instances_val2017.json"
+    )
+    (tmp_path / "val2017").mkdir()
+    (tmp_path / "val2017" / "0009.jpg").touch()
+    truth = read_truth(tmp_path)
+    assert (truth.split, truth.images[0].file) == ("val", tmp_path / "val2017" / "0009.jpg")
+
+
 def _yolo(folder: Path, yaml: str, **files: str) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "data.yaml").write_text(yaml)
