@@ -3,12 +3,15 @@
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import PurePosixPath
+
+import numpy as np
 
 from ars_web.annotations.foreign import ForeignImage, ForeignLabels, LeftOut
 from ars_web.errors import BadFile
 from ars_web.geometry.camera import Camera
+from ars_web.geometry.polygon import Polygon
 from ars_web.sessions.model import FrameTable
 
 NO_FRAME = "it is in an image that is none of the session's frames"
@@ -76,6 +79,35 @@ def matched_images(labels: ForeignLabels, frames: FrameTable, cameras: Mapping[i
     _refuse_other_sizes(labels, certain, frames, cameras)
     notes.extend(_other_cameras(labels, certain, frames, cameras))
     return Matching(certain, problems, tuple(notes))
+
+
+def in_pixels(
+    labels: ForeignLabels, matching: Matching, frames: FrameTable, cameras: Mapping[int, Camera]
+) -> ForeignLabels:
+    """The same labels with outlines and rectangles in image coordinates, by the cameras of the frames that images are.
+
+    Those in images that are no frames stay as they are.
+    """
+    if not labels.in_shares:
+        return labels
+    sizes = {place: cameras[int(frames.camera_ids[index])] for place, index in matching.frames.items()}
+
+    def scale(image: int) -> np.ndarray:
+        camera = sizes.get(image)
+        return np.ones(2) if camera is None else np.array([camera.width, camera.height], dtype=np.float64)
+
+    outlines = [
+        replace(
+            one,
+            polygons=tuple(
+                Polygon(p.outer * scale(one.image), tuple(hole * scale(one.image) for hole in p.holes))
+                for p in one.polygons
+            ),
+        )
+        for one in labels.outlines
+    ]
+    rectangles = [replace(one, bbox=one.bbox * np.tile(scale(one.image), 2)) for one in labels.rectangles]
+    return replace(labels, outlines=tuple(outlines), rectangles=tuple(rectangles), in_shares=False)
 
 
 def _by_name(named: Sequence[tuple[int, str]], names: Sequence[str]) -> dict[int, int]:
