@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Int
 
 from ars_web.annotations.foreign import ForeignLabels
 from ars_web.datasets.options import ExportOptions
@@ -22,6 +22,7 @@ from ars_web.studies.agreement import RectangleAgreement, matches, rectangle_agr
 from ars_web.studies.automatic_labels import RECTANGLES, AutomaticLabels, RectangleKind, automatic_labels
 from ars_web.studies.compared_frames import ComparedFrame, Sides, WorstFrame, compared_frames, worst_frames
 from ars_web.studies.comparison_warnings import UncomparedClass, comparison_warnings
+from ars_web.studies.hidden_bands import HiddenBand, hidden_bands
 from ars_web.studies.manual_labels import manual_labels
 from ars_web.studies.rectangle_matching import Rectangles
 
@@ -30,27 +31,6 @@ IOU = 0.3
 
 WORST = 12
 """Frames that are shown."""
-
-HIDDEN_BANDS: tuple[tuple[float, float], ...] = ((0.95, 1.0), (0.75, 0.95), (0.5, 0.75), (0.0, 0.5))
-"""Visible shares, from and below (1 itself belongs to the first), the least hidden first."""
-
-
-@dataclass(frozen=True)
-class HiddenBand:
-    """Pairs whose automatic label has a visible share between two bounds.
-
-    Attributes:
-        lowest, highest: the bounds.
-        matched: pairs, by the rectangles in the image.
-        in_image: mean IoU of those; None where there is none.
-        visible: mean IoU of the same manual labels with the rectangles round what is seen; None where there is none.
-    """
-
-    lowest: float
-    highest: float
-    matched: int
-    in_image: float | None
-    visible: float | None
 
 
 @dataclass(frozen=True)
@@ -138,6 +118,7 @@ def compare(
     )
     frames = compared_frames(sides, by_hand.frames, snapshot.frames.names)
     never_by_hand, unknown = _uncompared(sides)
+    bands = hidden_bands(sides, by_program.visible)
     agreements: dict[RectangleKind, RectangleAgreement] = {
         of: rectangle_agreement(manual, automatic[of], found[of], names=names, compared=compared) for of in RECTANGLES
     }
@@ -149,14 +130,14 @@ def compare(
         iou=iou,
         rectangles=agreements,
         hidden=int((np.isnan(by_program.bbox["visible"][:, 0]) & sides.automatic_counts).sum()),
-        bands=_bands(sides, by_program.visible),
+        bands=bands,
         frames=tuple(frames),
         worst=worst_frames(sides, frames, count=worst),
         never_by_hand=never_by_hand,
         unknown=unknown,
         left_out=reasons(by_hand.left_out),
         notes=by_hand.notes,
-        warnings=tuple(comparison_warnings(agreements["in_image"], never_by_hand, unknown)),
+        warnings=tuple(comparison_warnings(agreements["in_image"], bands, never_by_hand, unknown)),
     )
 
 
@@ -168,30 +149,6 @@ def _rectangles(labels: AutomaticLabels, of: RectangleKind, kinds: Mapping[str, 
     """All labels that have such a rectangle."""
     has = ~np.isnan(labels.bbox[of][:, 0])
     return Rectangles(labels.frame[has], _kinds(labels.class_names, kinds)[has], labels.bbox[of][has])
-
-
-def _bands(sides: Sides, visible: Float[np.ndarray, "m"]) -> tuple[HiddenBand, ...]:
-    pairs = sides.found.pairs
-    shares = visible[pairs.second]
-    around_seen = _ious(sides.manual.bbox[pairs.first], sides.visible[pairs.second])
-    bands: list[HiddenBand] = []
-    for lowest, highest in HIDDEN_BANDS:
-        inside = (shares >= lowest) & ((shares < highest) | (highest == 1.0))
-        seen = inside & ~np.isnan(around_seen)
-        bands.append(HiddenBand(lowest, highest, int(inside.sum()), _mean(pairs.iou[inside]), _mean(around_seen[seen])))
-    return tuple(bands)
-
-
-def _ious(first: Float[np.ndarray, "m 4"], second: Float[np.ndarray, "m 4"]) -> Float[np.ndarray, "m"]:
-    """Of each row with its own; NaN where a rectangle is."""
-    sides = np.minimum(first[:, 2:], second[:, 2:]) - np.maximum(first[:, :2], second[:, :2])
-    common = np.clip(sides, 0.0, None).prod(axis=1)
-    areas = [(one[:, 2:] - one[:, :2]).prod(axis=1) for one in (first, second)]
-    return common / (areas[0] + areas[1] - common)
-
-
-def _mean(values: Float[np.ndarray, "m"]) -> float | None:
-    return float(values.mean()) if len(values) else None
 
 
 def _uncompared(sides: Sides) -> tuple[tuple[UncomparedClass, ...], tuple[UncomparedClass, ...]]:

@@ -17,7 +17,7 @@ NAMES: dict[RectangleKind, str] = {
 
 def iou_histogram(comparison: Comparison) -> bytes:
     """How many pairs have which IoU, by what automatic labels are drawn round, and where their means are."""
-    figure = new_figure(6.4, 3.4)
+    figure = new_figure(5.6, 3.3)
     axes = figure.subplots()
     plain_axes(axes)
     edges = np.linspace(0, 1, BINS + 1)
@@ -38,7 +38,7 @@ def iou_histogram(comparison: Comparison) -> bytes:
 
 def iou_by_visibility(comparison: Comparison) -> bytes:
     """Mean IoU of pairs by how much nearer objects hide, with whole rectangles and with those round what is seen."""
-    figure = new_figure(6.4, 3.4)
+    figure = new_figure(5.6, 3.3)
     axes = figure.subplots()
     plain_axes(axes)
     bands = comparison.bands

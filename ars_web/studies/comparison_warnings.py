@@ -4,9 +4,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from ars_web.studies.agreement import Offsets, RectangleAgreement
+from ars_web.studies.hidden_bands import HiddenBand
 
 FEW_PAIRS = 30
 """Of which shares and means say little."""
+
+LOOSE = 0.8
+"""IoU below which rectangles of what is wholly seen are not one rectangle, drawn twice."""
 
 SHIFT = 0.4
 """Pixels by which sides may be off in the median: half a pixel is a convention, less is how people draw."""
@@ -30,12 +34,16 @@ class UncomparedClass:
 
 
 def comparison_warnings(
-    agreement: RectangleAgreement, never_by_hand: Sequence[UncomparedClass], unknown: Sequence[UncomparedClass]
+    agreement: RectangleAgreement,
+    bands: Sequence[HiddenBand],
+    never_by_hand: Sequence[UncomparedClass],
+    unknown: Sequence[UncomparedClass],
 ) -> Iterator[str]:
     """One text for each thing.
 
     Args:
         agreement: by the rectangles in the image.
+        bands: the pairs by how much is hidden, those of which nothing is first.
         never_by_hand: the session's classes that have labels and no manual one.
         unknown: manual classes that the session has not.
     """
@@ -62,6 +70,13 @@ def comparison_warnings(
         yield "No manual label is of a class that is compared: there is nothing to judge by."
     elif total.matched < FEW_PAIRS:
         yield f"Only {total.matched} labels have a partner: shares and means of so few say little. Label more frames."
+    unhidden = bands[0]
+    if unhidden.matched >= FEW_PAIRS and unhidden.in_image is not None and unhidden.in_image < LOOSE:
+        yield (
+            f"Labels of objects that nothing hides overlap by {unhidden.in_image:.2f} only, in the mean, so it is not"
+            " what is hidden: a box round what is no box has too wide a rectangle. Give objects hulls, by outlining"
+            " them, or meshes; and look whether boxes sit tightly and poses are right."
+        )
     if agreement.offsets is not None and total.matched >= FEW_PAIRS:
         yield from _shifts(agreement.offsets)
 

@@ -256,19 +256,35 @@ def test_labels_that_have_nothing_in_common_are_refused(make_session: Callable[.
         study(make_session(), posed)
 
 
+MANY = tuple(f"{i}.png" for i in range(20))
+"""Frames with two cups each: pairs enough to speak of conventions."""
+
+
+def cups(*, left: float = 0, top: float = 0, right: float = 0, bottom: float = 0) -> ForeignLabels:
+    """Both cups in all of MANY, sides moved by so much."""
+    off = np.array([left, top, right, bottom])
+    return by_hand({name: [("cup", CUP + off), ("cup", CUT + off)] for name in MANY})
+
+
 def test_labels_that_are_all_moved_are_told(make_session: Callable[..., SessionSnapshot]) -> None:
-    names = tuple(f"{i}.png" for i in range(20))
-    moved = [("cup", [x + 1 for x in CUP]), ("cup", [x - 1 if i % 2 else x for i, x in enumerate(CUT)])]
-    found = study(make_session(names=names), by_hand(dict.fromkeys(names, moved[:1] * 1 + moved[1:])))
-    # Cups lie 1 px up and left of theirs; of the cut one, left and right agree. In the median left and right are off by
-    # half of that, up and down by nothing.
-    assert [line for line in found.warnings if "further" in line] == [
-        "Automatic labels lie 0.5 px further left than manual ones, in the median: were the manual ones drawn on images"
-        " of another size or crop, or do they count pixels from another corner? If not, look at the poses."
-    ]
-    from_nought = [("cup", [CUP[0] - 1, CUP[1] - 1, *CUP[2:]])]
-    found = study(make_session(names=names * 1), by_hand(dict.fromkeys(names, [*from_nought, *from_nought])))
-    assert any("few say little" in line for line in found.warnings) is (20 < 30)
+    session = make_session(names=MANY)
+    assert [line for line in study(session, cups()).warnings if "never labelled" not in line] == []
+    moved = study(session, cups(left=0.5, right=0.5, top=-1, bottom=-1)).warnings
+    assert any(line.startswith("Automatic labels lie 0.5 px further left than manual ones") for line in moved)
+    assert any(line.startswith("Automatic labels lie 1.0 px further down than manual ones") for line in moved)
+    (counted_from_nought,) = (line for line in study(session, cups(left=-1, top=-1)).warnings if "VOC" in line)
+    assert "begin 1.0 px further left and up" in counted_from_nought
+
+
+def test_labels_that_are_all_narrower_are_told(make_session: Callable[..., SessionSnapshot]) -> None:
+    """Nothing hides the cups, and 14 x 14 of 20 x 20 px, 54 x 14 of 60 x 20 are left of them: 0.49 and 0.63."""
+    found = study(make_session(names=MANY), cups(left=3, top=3, right=-3, bottom=-3))
+    assert any("that nothing hides overlap by 0.56 only" in line for line in found.warnings)
+
+
+def test_few_pairs_are_told(make_session: Callable[..., SessionSnapshot]) -> None:
+    found = study(make_session(), by_hand(LABELS))
+    assert any(line.startswith("Only 3 labels have a partner") for line in found.warnings)
 
 
 @pytest.mark.parametrize(("kind", "least"), [("yolo", 0.999), ("coco", 0.999), ("voc", 0.97), ("cvat", 0.99)])
@@ -277,7 +293,7 @@ def test_our_own_exports_agree_with_the_session(
 ) -> None:
     session = make_session()
     options = ExportOptions.model_validate({"images": "none"})
-    run_export(plan_export([session], format=kind, options=options, out=tmp_path / "out"), workers=1)
+    run_export(plan_export([session], format=kind, options=options, out=tmp_path / "out"))
     found = study(session, read_labels(tmp_path / "out"))
     total = found.rectangles["in_image"].total
     assert (total.manual, total.automatic, total.matched, total.precision, total.recall) == (9, 9, 9, 1.0, 1.0)
