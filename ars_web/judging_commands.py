@@ -10,7 +10,7 @@ import typer
 
 from ars_web import arguments as take
 from ars_web.errors import BadInput
-from ars_web.terminal import note, print_json, print_table
+from ars_web.terminal import note, print_json, print_table, progress
 
 if TYPE_CHECKING:
     from ars_web.studies.compared_frames import ComparedFrame
@@ -67,9 +67,11 @@ def compare(
     with SessionStore(sessions) as store:
         sid = store.find(session)
         snapshot, name = store.snapshot(sid), store.summary(sid).name
-    found = compare_labels(
-        snapshot, read_labels(labels, format=kind), options=options, iou=iou, classes=names, worst=worst
-    )
+    by_hand = read_labels(labels, format=kind)
+    with progress("Comparing") as advance:
+        found = compare_labels(
+            snapshot, by_hand, options=options, iou=iou, classes=names, worst=worst, progress=advance
+        )
     if out is not None:
         page = report.comparison_page(found, snapshot, name=name)
         try:

@@ -34,7 +34,7 @@ _LABELS = "labels"
 _PARENTS = 2
 """How far above labels/train its data.yaml may be."""
 
-_LARGEST_YAML = 1 << 20
+_LARGEST_YAML = 1 << 18
 _LARGEST_FILE = 1 << 26
 _BESIDE = 1.0
 """How far beyond the image a corner may lie, in its widths and heights."""
@@ -185,7 +185,7 @@ def _names(file: Path) -> tuple[list[str], bool]:
         return names, False
     data = file_bytes(file)
     if len(data) > _LARGEST_YAML:
-        raise BadFile(file, "is over 1 MiB, which names of classes do not take")
+        raise BadFile(file, f"is over {_LARGEST_YAML >> 10} KiB, which names of classes do not take")
     try:
         # All texts as they are: YAML would make a truth value of a class called `no`.
         content = cast("object", yaml.load(data, Loader=yaml.BaseLoader))

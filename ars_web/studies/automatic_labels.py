@@ -5,7 +5,7 @@ amodal    round the whole object, beyond the image's border
 visible   round what is seen of it
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -40,8 +40,16 @@ class AutomaticLabels:
     visible: Float[np.ndarray, "m"]
 
 
-def automatic_labels(snapshot: SessionSnapshot, indices: Sequence[int], options: ExportOptions) -> AutomaticLabels:
+def automatic_labels(
+    snapshot: SessionSnapshot,
+    indices: Sequence[int],
+    options: ExportOptions,
+    *,
+    progress: Callable[[int, int], None] | None = None,
+) -> AutomaticLabels:
     """The labels that an export of the frames at `indices` (ascending) with these options would write.
+
+    `progress` is told (frames done, frames in all).
 
     Raises:
         BadInput: no object has the shape that is asked for, or there is no such shape.
@@ -53,7 +61,7 @@ def automatic_labels(snapshot: SessionSnapshot, indices: Sequence[int], options:
     rows, columns = np.nonzero(keep)
     state = snapshot.state
     names = [state.classes[box.class_id].name for _, box in sorted(state.boxes.items())]
-    visible = visible_rectangles(shapes, table)
+    visible = visible_rectangles(shapes, table, progress=progress)
     return AutomaticLabels(
         np.asarray(indices, dtype=np.int64)[rows],
         tuple(names[column] for column in columns.tolist()),

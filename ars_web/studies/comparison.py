@@ -6,7 +6,7 @@ paper compared with the first, and its mean IoU of 0.70 comes from that differen
 """
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -78,6 +78,7 @@ def compare(
     iou: float = IOU,
     classes: Mapping[str, str] | None = None,
     worst: int = WORST,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Comparison:
     """Compare a session's labels with manual ones, in the frames that somebody labelled.
 
@@ -86,6 +87,7 @@ def compare(
         iou: above 0, at most 1.
         classes: what the session calls a class of the manual labels, for those that have two names.
         worst: how many of the worst frames are kept with their labels.
+        progress: told (frames done, frames in all).
 
     Raises:
         BadFile: the manual labels are not of the session's images.
@@ -103,7 +105,7 @@ def compare(
             f"no class of the manual labels ({', '.join(sorted(set(by_hand.class_names)))}) is one of the session's"
             f" ({', '.join(ours) or 'none'}); say which is which, as --classes manual=session,…"
         )
-    by_program = automatic_labels(snapshot, by_hand.frames, options)
+    by_program = automatic_labels(snapshot, by_hand.frames, options, progress=progress)
     manual = Rectangles(by_hand.frame, _kinds(by_hand.class_names, kinds), by_hand.bbox)
     automatic = {of: _rectangles(by_program, of, kinds) for of in RECTANGLES}
     found = {of: matches(manual, automatic[of], iou=iou) for of in RECTANGLES}

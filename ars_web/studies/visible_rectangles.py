@@ -1,6 +1,6 @@
 """Rectangles round what is seen of objects, nearer ones taken away."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -10,7 +10,9 @@ from ars_web.datasets.shapes import PosedShapes
 from ars_web.geometry.instance_masks import InstanceMasks, instance_masks
 
 
-def visible_rectangles(shapes: PosedShapes, table: LabelTable) -> Float[np.ndarray, "n b 4"]:
+def visible_rectangles(
+    shapes: PosedShapes, table: LabelTable, *, progress: Callable[[int, int], None] | None = None
+) -> Float[np.ndarray, "n b 4"]:
     """(x0, y0, x1, y1) round the pixels of each shape that no nearer shape hides; image coordinates.
 
     A side that nothing hides is the label's own, exactly; one that something hides is a pixel's edge. NaN where the
@@ -19,6 +21,7 @@ def visible_rectangles(shapes: PosedShapes, table: LabelTable) -> Float[np.ndarr
     Args:
         shapes: b in n frames; all of them hide what is behind them.
         table: their labels.
+        progress: told (frames done, frames in all) after each.
     """
     found = np.full_like(table.bbox, np.nan)
     for row, (camera_id, T) in enumerate(zip(shapes.camera_ids.tolist(), shapes.Ts_world_camera, strict=True)):
@@ -26,6 +29,8 @@ def visible_rectangles(shapes: PosedShapes, table: LabelTable) -> Float[np.ndarr
         if columns:
             masks = instance_masks(shapes.cameras[camera_id], T, shapes.boxes, shapes.meshes)
             found[row] = _of_frame(masks, columns, table.bbox[row])
+        if progress is not None:
+            progress(row + 1, len(found))
     return found
 
 

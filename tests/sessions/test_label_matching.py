@@ -46,6 +46,11 @@ def test_an_exact_name_goes_before_one_that_fits() -> None:
     assert found.problems == {0: TWO_IMAGES}
 
 
+def test_a_name_may_be_the_one_of_an_export() -> None:
+    found = match(["left/1.png", "right/1.png", "caf\u00e9 2.jpg"], *named("left_1.png", "x/right_1.txt", "caf__2.jpg"))
+    assert found.frames == {0: 0, 1: 1, 2: 2}
+
+
 def test_a_name_that_comes_twice_is_no_frames() -> None:
     found = match(["1.png", "2.png"], *named("1.png", "1.png", "2.png"))
     assert (found.frames, found.problems) == ({2: 1}, {0: TWO_IMAGES, 1: TWO_IMAGES})

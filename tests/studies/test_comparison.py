@@ -53,7 +53,7 @@ def make_session(tmp_path: Path) -> Callable[..., SessionSnapshot]:
 
     def make(*, objects: tuple[tuple[str, Box], ...] = OBJECTS, names: tuple[str, ...] = NAMES) -> SessionSnapshot:
         (tmp_path / "images").mkdir(exist_ok=True)
-        paths = tuple(tmp_path / "images" / Path(name).name for name in names)
+        paths = tuple(tmp_path / "images" / name.replace("/", " ") for name in names)
         for path in paths:
             assert cv2.imwrite(str(path), np.full((200, 200, 3), 120, dtype=np.uint8))
         classes = list(dict.fromkeys(name for name, _ in objects))
@@ -226,6 +226,13 @@ def test_labels_in_other_images_are_left_out_and_told(make_session: Callable[...
     assert found.notes == ("1 of its 2 images are not compared, no frames: z.png",)
 
 
+def test_a_session_without_boxes_has_missed_everything(make_session: Callable[..., SessionSnapshot]) -> None:
+    session = make_session()
+    empty = replace(session, state=replace(session.state, boxes={}))
+    total = study(empty, by_hand(LABELS)).rectangles["in_image"].total
+    assert total == Agreement(5, 0, 0, None, 0.0, None, None)
+
+
 @pytest.mark.parametrize(
     ("given", "said"),
     [
@@ -291,7 +298,7 @@ def test_few_pairs_are_told(make_session: Callable[..., SessionSnapshot]) -> Non
 def test_our_own_exports_agree_with_the_session(
     make_session: Callable[..., SessionSnapshot], tmp_path: Path, kind: str, least: float
 ) -> None:
-    session = make_session()
+    session = make_session(names=("left/1.png", "right/1.png", "one two.png"))
     options = ExportOptions.model_validate({"images": "none"})
     run_export(plan_export([session], format=kind, options=options, out=tmp_path / "out"))
     found = study(session, read_labels(tmp_path / "out"))
