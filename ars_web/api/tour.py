@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Response
 from pydantic import Field
 
-from ars_web.api.dependencies import JsonResponse, ServicesDep, StrictRoute
+from ars_web.api.dependencies import IdempotencyKey, JsonResponse, ServicesDep, StrictRoute
 from ars_web.api.models import Number, Strict
 from ars_web.api.problems import documented
 from ars_web.datasets.coverage import chosen_boxes
@@ -42,8 +42,8 @@ class TourDraft(Strict):
     start_frame: Id | None = Field(None, description="frame at which the tour begins; absent: the last")
 
 
-@router.post("", operation_id="tour-plan", response_model=TourJson, responses=documented(404, 422))
-def plan(sid: str, draft: TourDraft, services: ServicesDep) -> Response:
+@router.post("", operation_id="tour-plan", response_model=TourJson, responses=documented(404, 413))
+def plan(sid: str, draft: TourDraft, services: ServicesDep, key: IdempotencyKey) -> Response:
     """Views that fill the empty cells of objects' coverage, as a short tour. Nothing is stored."""
     request = TourRequest(
         bins=SphereBins(draft.azimuth_bins, draft.polar_bins),

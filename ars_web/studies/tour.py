@@ -188,7 +188,7 @@ class Tour:
             return [*lines, f"nothing is empty: frames lie in all of the {self.cells} cells"]
         lines.append(
             f"{len(self.stops)} views fill {self.filled} of {self.empty} empty cells ({self.cells} in all); the way is"
-            f" {self.length:.2f} m with {math.degrees(self.turn):.0f} degrees of turning; what stands in it is not known"
+            f" {self.length:.2f} m with {math.degrees(self.turn):.0f} degrees of turning, obstacles not looked at"
         )
         return lines + [f"{count} cells stay empty: {SAID[reason]}" for reason, count in self.left_by_reason.items()]
 
