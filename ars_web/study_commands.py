@@ -60,7 +60,7 @@ def coverage(
         title = f"{snapshot.state.name}: {called(snapshot, box_id=box, class_id=class_id)}"
         out.write_bytes(coverage_png(found, title=title))
     elif out is not None:
-        write_json(out, coverage_json(found))
+        write_json(out, coverage_json(found).model_dump(mode="json"))
     if as_json:
         print_json(coverage_json(found).model_dump(mode="json"))
         return
