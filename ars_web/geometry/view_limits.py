@@ -100,13 +100,13 @@ def check_room(limits: ViewLimits, boxes: Sequence[Box]) -> None:
     anywhere = ((centres - far <= high) & (centres + far >= low)).any()
     if not anywhere:
         raise BadInput(
-            f"no camera is {low:g} to {high:g} m high and within {far:g} m of an object: the objects' centres are at"
+            f"no camera is {low:.3g} to {high:.3g} m high and within {far:.3g} m of an object: the objects' centres are at"
             f" heights of {centres.min():.3g} to {centres.max():.3g} m. Change the limits of height, or allow more"
             " distance"
         )
     tilts = [math.degrees(angle) for angle in limits.tilt]
     raise BadInput(
-        f"tilts of {tilts[0]:.3g} to {tilts[1]:.3g} degrees at distances of {near:g} to {far:g} m put the camera"
-        f" {lowest.min():.3g} to {highest.max():.3g} m high, and the limits of height are {low:g} to {high:g} m."
+        f"tilts of {tilts[0]:.3g} to {tilts[1]:.3g} degrees at distances of {near:.3g} to {far:.3g} m put the camera"
+        f" {lowest.min():.3g} to {highest.max():.3g} m high, and the limits of height are {low:.3g} to {high:.3g} m."
         " Widen one of the three"
     )
