@@ -100,7 +100,7 @@ def check_room(limits: ViewLimits, boxes: Sequence[Box]) -> None:
     anywhere = ((centres - far <= high) & (centres + far >= low)).any()
     if not anywhere:
         raise BadInput(
-            f"no camera is {low:.3g} to {high:.3g} m high and within {far:.3g} m of an object: the objects' centres are at"
+            f"no camera is {low:.3g} to {high:.3g} m high and within {far:.3g} m of an object: their centres are at"
             f" heights of {centres.min():.3g} to {centres.max():.3g} m. Change the limits of height, or allow more"
             " distance"
         )
