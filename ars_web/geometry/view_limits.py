@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from ars_web.errors import BadInput
 from ars_web.geometry import rigid_transform
-from ars_web.geometry.box import Box
+from ars_web.geometry.box import FARTHEST, Box
 
 CLEARANCE = 0.05
 """Metres that a camera stays away from boxes."""
@@ -50,6 +50,8 @@ class ViewLimits:
         ):
             if not (math.isfinite(low) and math.isfinite(high)):
                 raise BadInput(f"the limits of {name} must be finite numbers of {unit}, not {low} and {high}")
+            if max(abs(low), abs(high)) > FARTHEST:
+                raise BadInput(f"the limits of {name} must be within {FARTHEST:g} {unit}, not {low:g} and {high:g}")
             if low > high:
                 raise BadInput(f"the limits of {name} are the wrong way round: {low:g} is more than {high:g}")
         if self.distance[0] < 0 or self.distance[1] <= 0:

@@ -53,6 +53,7 @@ def test_straight_down_and_up_the_image_s_x_is_the_world_s() -> None:
         ({"tilt": (0.6, 0.3)}, "the limits of tilt are the wrong way round"),
         ({"distance": (math.nan, 0.3)}, "the limits of distance must be finite numbers of metres, not nan and 0.3"),
         ({"height": (0.0, math.inf)}, "the limits of height must be finite numbers of metres"),
+        ({"distance": (0.3, 1e300)}, "the limits of distance must be within 1e\\+07 metres"),
         ({"distance": (-0.1, 0.3)}, "a distance must be more than 0 m, not -0.1 to 0.3"),
         ({"distance": (0.0, 0.0)}, "a distance must be more than 0 m"),
         ({"tilt": (0.0, 2.0)}, "a tilt lies between -90 degrees, straight up, and 90, straight down, not 0 to 114.592"),
