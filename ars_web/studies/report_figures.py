@@ -93,13 +93,13 @@ class Course:
 
     Attributes:
         runs: split, first column and columns of each run.
-        labels: bars of at most 1 in height, from 1 down; the mean number of labels in a column's frames.
+        labels: path of steps, 1 high at most and standing on y = 1: the mean number of labels in a column's frames.
         most: labels in the fullest column.
     """
 
     width: int
     runs: tuple[tuple[str, float, float], ...]
-    labels: tuple[Place, ...]
+    labels: str
     most: float
 
 
@@ -177,9 +177,8 @@ def course(split: Int[np.ndarray, "n"], labels: Int[np.ndarray, "n"]) -> Course:
     borders = np.arange(width + 1) * n // width
     means = np.add.reduceat(labels, borders[:-1]) / np.diff(borders)
     most = float(means.max())
-    heights = (means / max(most, 1e-9)).round(4).tolist()
-    places = tuple(Place(x, round(1.0 - h, 4), 1.0, h) for x, h in enumerate(heights) if h > 0)
-    return Course(width, runs, places, most)
+    steps = "".join(f"V{_short(1.0 - mean / max(most, 1e-9))}h1" for mean in means.tolist())
+    return Course(width, runs, f"M0 1{steps}V1z", most)
 
 
 def neighbour_dots(near: Neighbours, *, width: float = 420.0, height: float = 200.0) -> Dots:
@@ -237,7 +236,10 @@ def _hole(hole: Hole) -> list[Place]:
         pieces = [(start, 360.0), (0.0, end)]
     else:
         pieces = [(start, end)]
-    return [Place(left, low, right - left, high - low) for left, right in pieces if right > left]
+    # A little within its bins, so that two beside one another do not become one.
+    return [
+        Place(left + 1.0, low + 1.0, right - left - 2.0, high - low - 2.0) for left, right in pieces if right > left
+    ]
 
 
 def _short(value: float) -> str:
