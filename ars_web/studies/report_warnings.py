@@ -167,8 +167,8 @@ def _class(report: SessionReport, one: ClassFacts) -> Iterator[ReportWarning]:
         yield _warning(
             "seen_from_one_side",
             about=one.name,
-            says=f"objects of class {one.name!r} are not seen from {one.views.unseen_azimuths:.0f} degrees in one piece"
-            f" of the way round them{_hole(one.views)}",
+            says=f"objects of class {one.name!r} are seen from one side: from {one.views.unseen_azimuths:.0f} degrees in"
+            f" one piece of the way round them there is no view{_hole(one.views)}",
             why="a detector knows an object from where it was filmed: 3,000 images from all around train a better one"
             " than 5,000 from one side",
             remedy="film from there, too, or turn the object and film again; a class that looks alike from there needs"
@@ -302,7 +302,7 @@ def _hole(views: ViewFacts) -> str:
     if not views.holes:
         return ""
     hole = views.holes[0]
-    return f"; on the side of +z the largest hole: {hole.words}" if hole.polar[1] <= 90.0 else f"; {hole.words}"
+    return f"; {hole.words}"
 
 
 def _above(one: ClassFacts, share: float) -> int:

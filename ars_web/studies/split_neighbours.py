@@ -23,7 +23,7 @@ ASKED_FRAMES = 2_000
 """Frames of a split whose neighbours are looked for, spread evenly over it: each is held against every frame that
 trains, and the share of twins among this many is known to about one percent."""
 
-_PAIRS_AT_ONCE = 4_000_000
+_PAIRS_AT_ONCE = 250_000
 
 
 @dataclass(frozen=True, eq=False)
