@@ -92,7 +92,7 @@ def _whole(report: SessionReport) -> Iterator[ReportWarning]:
     if not report.labels:
         yield _warning(
             "no_labels",
-            says=f"none of the {len(report.boxes)} objects is labelled in any of the {frames.chosen} chosen frames",
+            says=f"no object, of {len(report.boxes)}, is labelled in any of the {frames.chosen} chosen frames",
             why="there is nothing to learn",
             remedy="look whether the boxes are where the camera looked, choose other frames, or loosen the rules that"
             " drop labels",

@@ -19,9 +19,9 @@ TWIN_MOVE = 0.05
 TWIN_TURN = math.radians(5.0)
 """Radians, about any axis."""
 
-ASKED_FRAMES = 2_000
+ASKED_FRAMES = 1_000
 """Frames of a split whose neighbours are looked for, spread evenly over it: each is held against every frame that
-trains, and the share of twins among this many is known to about one percent."""
+trains, and the share of twins among this many is known to about two percent."""
 
 _PAIRS_AT_ONCE = 250_000
 
