@@ -44,6 +44,7 @@ from ars_web.api import (
     polygons,
     problems,
     refine,
+    report,
     scene_door,
     segment,
     sessions,
@@ -139,6 +140,7 @@ def create_app(settings: Settings) -> FastAPI:
         scene_door,
         exports,
         formats,
+        report,
     ):
         app.include_router(module.router)
     app.include_router(login.router(static))

@@ -207,3 +207,77 @@ def tour(
 
 def _percent(share: float) -> str:
     return f"{100 * share:.1f} %"
+
+
+@app.command()
+def report(
+    session: take.Session,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", metavar="FILE.html", help="The page; default: the session's name and -report.html, here."
+        ),
+    ] = None,
+    frames_step: take.FramesStep = None,
+    frames_start: take.FramesStart = None,
+    frames_stop: take.FramesStop = None,
+    frames_list: take.FramesList = None,
+    images: take.Images = None,
+    shape: take.Shape = None,
+    min_visible: take.MinVisible = None,
+    max_truncated: take.MaxTruncated = None,
+    min_area_px: take.MinArea = None,
+    split_train: take.SplitTrain = None,
+    split_val: take.SplitVal = None,
+    split_test: take.SplitTest = None,
+    split_by: take.SplitBy = None,
+    split_seed: take.SplitSeed = None,
+    sessions: take.Sessions = take.SESSIONS,
+    as_json: take.Json = False,
+) -> None:
+    """What an export would hold, and what to mend before training: one page, with pictures, that needs nothing else.
+
+    Options decide labels and splits as those of `export` do. With --json the facts are printed instead, and a page is
+    written only where --out says so.
+    """
+    from ars_web.datasets.file_names import safe
+    from ars_web.reporting.page import write_page
+    from ars_web.sessions.store import SessionStore
+    from ars_web.studies.report_page import session_page
+    from ars_web.studies.session_report import session_report
+    from ars_web.studies.session_study import study_session
+
+    if out is not None and out.suffix.lower() not in (".html", ".htm"):
+        raise typer.BadParameter(f"{out} does not end in .html", param_hint="--out")
+    given = {
+        "frames.step": frames_step,
+        "frames.start": frames_start,
+        "frames.stop": frames_stop,
+        "frames.list": take.whole_numbers(frames_list, "--frames-list") or None,
+        "images": images,
+        "shape": shape,
+        "min_visible": min_visible,
+        "max_truncated": max_truncated,
+        "min_area_px": min_area_px,
+        "split.train": split_train,
+        "split.val": split_val,
+        "split.test": split_test,
+        "split.by": split_by,
+        "split.seed": split_seed,
+    }
+    options = take.export_options(given)
+    with SessionStore(sessions) as store:
+        sid = store.find(session)
+        snapshot, recorded = store.snapshot(sid), store.summary(sid)
+    study = study_session(snapshot, options)
+    facts = session_report(study, recorded)
+    if as_json:
+        print_json(facts.model_dump(mode="json"))
+    if out is None and not as_json:
+        out = Path(f"{safe(snapshot.state.name)}-report.html")
+    if out is not None:
+        write_page(session_page(study, facts), out)
+    if not as_json:
+        for warning in facts.warnings:
+            print(f"{'grave' if warning.grave else 'warning'}: {warning.says}")
+        print(out)
