@@ -38,7 +38,10 @@ Index = Annotated[int, Query(ge=0, lt=2**53)]
     "",
     operation_id="report-read",
     response_class=Response,
-    responses={200: {"description": "the page", "content": {"text/html": {}}}, **documented(404)},
+    responses={
+        200: {"description": "the page", "content": {"text/html": {"schema": {"type": "string"}}}},
+        **documented(404),
+    },
 )
 def read(
     sid: str,

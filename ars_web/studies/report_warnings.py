@@ -167,8 +167,9 @@ def _class(report: SessionReport, one: ClassFacts) -> Iterator[ReportWarning]:
         yield _warning(
             "seen_from_one_side",
             about=one.name,
-            says=f"objects of class {one.name!r} are seen from one side: from {one.views.unseen_azimuths:.0f} degrees in"
-            f" one piece of the way round them there is no view{_hole(one.views)}",
+            says=f"objects of class {one.name!r} are seen from one side: from"
+            f" {one.views.unseen_azimuths:.0f} degrees in one piece of the way round them there is"
+            f" no view{_hole(one.views)}",
             why="a detector knows an object from where it was filmed: 3,000 images from all around train a better one"
             " than 5,000 from one side",
             remedy="film from there, too, or turn the object and film again; a class that looks alike from there needs"
