@@ -60,6 +60,10 @@ install_import_hook(
             "instance_masks",
             "run_lengths",
             "hidden_points",
+            "cell_samples",
+            "view_limits",
+            "view_proposals",
+            "view_tour",
         )
     ],
     "beartype.beartype",
