@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryFile
 from types import ModuleType
 
 import pytest
@@ -90,14 +91,18 @@ def _served(sessions: Path, *options: str) -> Iterator[tuple[subprocess.Popen[st
     command = [sys.executable, "-m", "ars_web", "serve", "--sessions", str(sessions), "--port", "0", *options]
     # The ars_web beside this file, whether or not one is installed.
     search = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=search)
-    try:
-        said = [process.stdout.readline() for _ in range(2)]
-        assert "/login?code=" in said[-1], "".join(said) + process.stderr.read()
-        yield process, said[-1].split()[-1]
-    finally:
-        process.kill()
-        process.communicate()
+    with TemporaryFile("w+") as log:  # a pipe that nobody reads would stop a server that has much to say
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True, env=search)
+        try:
+            said = [process.stdout.readline() for _ in range(2)]
+            if "/login?code=" not in said[-1]:
+                process.wait()
+                log.seek(0)
+                raise AssertionError("".join(said) + log.read())
+            yield process, said[-1].split()[-1]
+        finally:
+            process.kill()
+            process.communicate()
 
 
 @pytest.fixture(scope="session")
