@@ -24,6 +24,9 @@ FLAGS = [
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
     "--ignore-gpu-blocklist",
+    # Pages are put together without SwiftShader, which WebGL alone needs: a third of what a test without it takes.
+    "--disable-gpu-compositing",
+    "--disable-gpu-rasterization",
     "--disable-background-networking",
     "--disable-quic",
     "--no-first-run",
