@@ -355,6 +355,89 @@ export interface paths {
         patch: operations["classes-change"];
         trace?: never;
     };
+    "/api/sessions/{sid}/coverage": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Read
+         * @description The paper's histogram of viewpoints, and one with cells of equal area.
+         *
+         *     A frame counts where an export with these options would label the object. Views that a class's symmetry makes look
+         *     alike count as one, in the bin that stands for them all.
+         */
+        get: operations["coverage-read"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/coverage/picture": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Picture
+         * @description The same as a picture, for a paper or a notebook.
+         */
+        get: operations["coverage-picture"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/coverage/frames": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Frames
+         * @description The frames that see an object from one bin.
+         */
+        get: operations["coverage-frames-list"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/coverage/objects": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Objects
+         * @description How much is seen of each object and class: where a recording lacks most. Empty where there is no box.
+         */
+        get: operations["coverage-objects-list"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/sessions/{sid}/frames": {
         parameters: {
             query?: never;
@@ -1344,6 +1427,19 @@ export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
         /**
+         * BinFrames
+         * @description The views of a bin, frame by frame.
+         */
+        BinFrames: {
+            /** Total */
+            total: number;
+            /**
+             * Items
+             * @description the first of them, `limit` at most, spread evenly over all
+             */
+            items: components["schemas"]["ViewJson-Output"][];
+        };
+        /**
          * BoxAnswer
          * @description A virtual box; its ETag is its revision.
          */
@@ -1424,7 +1520,7 @@ export interface components {
             /** Class Id */
             class_id: number;
             /** Views */
-            views: components["schemas"]["ViewJson"][];
+            views: components["schemas"]["ViewJson-Input"][];
             /**
              * Name
              * @description default: the class's name, with a number where it is taken
@@ -1855,6 +1951,48 @@ export interface components {
             frame: number;
         };
         /**
+         * CoverageJson
+         * @description From where objects are seen: theta = polar angle from +z, phi = azimuth, in the box's frame, radians.
+         */
+        CoverageJson: {
+            /**
+             * Azimuth Edges
+             * @description from -pi to pi
+             */
+            azimuth_edges: number[];
+            /**
+             * Polar Edges
+             * @description from 0 to pi
+             */
+            polar_edges: number[];
+            /**
+             * Counts
+             * @description views by azimuth bin, then by polar bin
+             */
+            counts: number[][];
+            /**
+             * Reachable
+             * @description false: the class's symmetry folds all of the bin elsewhere
+             */
+            reachable: boolean[][];
+            equal_area: components["schemas"]["EqualAreaJson"];
+            /**
+             * Frames
+             * @description in which any of the objects is labelled
+             */
+            frames: number;
+            /**
+             * Views
+             * @description labels of the objects in all frames
+             */
+            views: number;
+            /**
+             * Empty Fraction
+             * @description of the reachable bins of equal angles, those without a view
+             */
+            empty_fraction: number;
+        };
+        /**
          * DuplicateDraft
          * @description Where the copy of a box goes.
          */
@@ -1924,6 +2062,46 @@ export interface components {
                 number,
                 number
             ][][];
+        };
+        /**
+         * EqualAreaJson
+         * @description The cells of equal area.
+         */
+        EqualAreaJson: {
+            /**
+             * Directions
+             * @description the middle of each cell, in the box's frame
+             */
+            directions: [
+                number,
+                number,
+                number
+            ][];
+            /**
+             * Counts
+             * @description views in each cell
+             */
+            counts: number[];
+            /**
+             * Reachable
+             * @description false: the class's symmetry folds all directions of the cell elsewhere
+             */
+            reachable: boolean[];
+            /**
+             * Bands
+             * @description cells in each band from +z downward; they follow one another by azimuth
+             */
+            bands: number[];
+            /**
+             * Band Edges
+             * @description z of the bands' edges, from 1 down to -1
+             */
+            band_edges: number[];
+            /**
+             * Empty Fraction
+             * @description of the reachable cells: the share of all directions without a view
+             */
+            empty_fraction: number;
         };
         /**
          * ExportDraft
@@ -2484,7 +2662,7 @@ export interface components {
          */
         HullPreviewDraft: {
             /** Views */
-            views: components["schemas"]["ViewJson"][];
+            views: components["schemas"]["ViewJson-Input"][];
             /**
              * Widen Px
              * @default 0
@@ -3364,6 +3542,39 @@ export interface components {
             degrees: number | null;
             /** Reason */
             reason: string;
+        };
+        /**
+         * ObjectCoverage
+         * @description How much of an object, or of a class's objects together, is seen.
+         */
+        ObjectCoverage: {
+            /** Class Id */
+            class_id: number;
+            /**
+             * Box Id
+             * @description null: all of the class
+             */
+            box_id: number | null;
+            /**
+             * Frames
+             * @description in which it is labelled
+             */
+            frames: number;
+            /** Views */
+            views: number;
+            /**
+             * Empty Fraction
+             * @description share of all directions, in cells of equal area, without a view
+             */
+            empty_fraction: number;
+        };
+        /**
+         * ObjectsCoverage
+         * @description All boxes, then all classes that have some.
+         */
+        ObjectsCoverage: {
+            /** Items */
+            items: components["schemas"]["ObjectCoverage"][];
         };
         /**
          * ObservationJson
@@ -4320,7 +4531,7 @@ export interface components {
          * ViewJson
          * @description The object's outline in one frame.
          */
-        ViewJson: {
+        "ViewJson-Input": {
             /**
              * Polygons
              * @description what an odd number of their rings enclose is inside; at most 20000 corners in all
@@ -4333,6 +4544,16 @@ export interface components {
             mask_png?: string | null;
             /** Frame */
             frame: number;
+        };
+        /**
+         * ViewJson
+         * @description A frame that sees an object from the bin.
+         */
+        "ViewJson-Output": {
+            /** Frame */
+            frame: number;
+            /** Box Id */
+            box_id: number;
         };
         /**
          * ViewMisfit
@@ -4424,6 +4645,61 @@ export interface components {
             yours: components["schemas"]["PlacedJson"];
             /** @description as it is now; null: deleted */
             current: components["schemas"]["BoxAnswer"] | null;
+        };
+        /**
+         * CoverageSightJson
+         * @description A sphere round a box: how many views there are of it from each direction.
+         */
+        CoverageSightJson: {
+            /** Box Id */
+            box_id: number;
+            /**
+             * Whole Class
+             * @description count views of all objects of the box's class
+             */
+            whole_class: boolean;
+            /** Azimuth Bins */
+            azimuth_bins: number;
+            /** Polar Bins */
+            polar_bins: number;
+            /**
+             * Min Visible
+             * @description of an object, for a view to count
+             */
+            min_visible: number;
+            /**
+             * Chosen Bin
+             * @description outlined: azimuth bin * polar bins + polar bin
+             * @default null
+             */
+            chosen_bin: number | null;
+            /**
+             * Chosen Cell
+             * @description or a cell of equal area
+             * @default null
+             */
+            chosen_cell: number | null;
+        };
+        /**
+         * DirectionPickedMessage
+         * @description The coverage's sphere was clicked; the direction is folded by the object's symmetry.
+         */
+        DirectionPickedMessage: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "direction";
+            /**
+             * Bin
+             * @description of equal angles: azimuth bin * polar bins + polar bin
+             */
+            bin: number;
+            /**
+             * Cell
+             * @description of equal area
+             */
+            cell: number;
         };
         /**
          * DraggedMessage
@@ -4561,7 +4837,7 @@ export interface components {
          * LiveToPage
          * @description A message from the server to the page.
          */
-        LiveToPage: components["schemas"]["ReadyMessage"] | components["schemas"]["ResetMessage"] | components["schemas"]["EditMessage"] | components["schemas"]["GoneMessage"] | components["schemas"]["HereMessage"] | components["schemas"]["PickedMessage"] | components["schemas"]["EnteredMessage"] | components["schemas"]["DraggedMessage"] | components["schemas"]["ConflictedMessage"] | components["schemas"]["RefusedMessage"];
+        LiveToPage: components["schemas"]["ReadyMessage"] | components["schemas"]["ResetMessage"] | components["schemas"]["EditMessage"] | components["schemas"]["GoneMessage"] | components["schemas"]["HereMessage"] | components["schemas"]["PickedMessage"] | components["schemas"]["DirectionPickedMessage"] | components["schemas"]["EnteredMessage"] | components["schemas"]["DraggedMessage"] | components["schemas"]["ConflictedMessage"] | components["schemas"]["RefusedMessage"];
         /**
          * LookMessage
          * @description Turn the free camera to something.
@@ -4835,6 +5111,17 @@ export interface components {
             hidden: number[];
             /** Dark */
             dark: boolean;
+            /**
+             * @description a sphere in the scene; null: none
+             * @default null
+             */
+            coverage: components["schemas"]["CoverageSightJson"] | null;
+            /**
+             * Tour
+             * @description T_world_camera of cameras proposed next, in their order
+             * @default []
+             */
+            tour: components["schemas"]["TransformJson"][];
         };
         /**
          * ViewsProblem
@@ -6933,6 +7220,392 @@ export interface operations {
                 };
                 content: {
                     "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "coverage-read": {
+        parameters: {
+            query?: {
+                /** @description one object; default: all of them together */
+                box_id?: number | null;
+                /** @description the objects of a class */
+                class_id?: number | null;
+                azimuth_bins?: number;
+                polar_bins?: number;
+                /** @description views in which less of an object is seen do not count */
+                min_visible?: number;
+                /** @description default: the hull where a box has one, else the box */
+                shape?: ("box" | "hull" | "mesh") | null;
+            };
+            header?: never;
+            path: {
+                sid: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CoverageJson"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "coverage-picture": {
+        parameters: {
+            query?: {
+                /** @description one object; default: all of them together */
+                box_id?: number | null;
+                /** @description the objects of a class */
+                class_id?: number | null;
+                azimuth_bins?: number;
+                polar_bins?: number;
+                /** @description views in which less of an object is seen do not count */
+                min_visible?: number;
+                /** @description default: the hull where a box has one, else the box */
+                shape?: ("box" | "hull" | "mesh") | null;
+            };
+            header?: never;
+            path: {
+                sid: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description the histograms as PNG */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "image/png": unknown;
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "coverage-frames-list": {
+        parameters: {
+            query?: {
+                /** @description one object; default: all of them together */
+                box_id?: number | null;
+                /** @description the objects of a class */
+                class_id?: number | null;
+                azimuth_bins?: number;
+                polar_bins?: number;
+                /** @description views in which less of an object is seen do not count */
+                min_visible?: number;
+                /** @description default: the hull where a box has one, else the box */
+                shape?: ("box" | "hull" | "mesh") | null;
+                /** @description a bin of equal angles, with `polar` */
+                azimuth?: number | null;
+                polar?: number | null;
+                /** @description or a cell of equal area */
+                cell?: number | null;
+                limit?: number;
+            };
+            header?: never;
+            path: {
+                sid: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BinFrames"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "coverage-objects-list": {
+        parameters: {
+            query?: {
+                azimuth_bins?: number;
+                polar_bins?: number;
+                /** @description views in which less of an object is seen do not count */
+                min_visible?: number;
+                /** @description default: the hull where a box has one, else the box */
+                shape?: ("box" | "hull" | "mesh") | null;
+            };
+            header?: never;
+            path: {
+                sid: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ObjectsCoverage"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
                 };
             };
             /** @description a fault of the server, logged there under the number in the detail */
