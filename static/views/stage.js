@@ -10,6 +10,7 @@ import { Hints } from "./hints.js";
 import { asked } from "./photo_sight.js";
 import { MadeBox, PointsTool } from "./points_tool.js";
 import { ExportPanel } from "./export/panel.js";
+import { CoverageDock } from "./coverage/dock.js";
 import { MasksMode } from "./masks/mode.js";
 
 /** @param {{view: string}} props `view`: the name by which the server knows the page's scene */
@@ -59,7 +60,8 @@ export function Stage({ view }) {
   const mode = store.mode.value;
   const filled = mode === "export" || mode === "masks" || store.tool.value === "points";
   const isFlat = mode === "frame" && !filled && store.markFunction.value !== "";
-  return html`<main class="stage" aria-label="Scene">
+  const inCoverage = mode === "coverage" && !filled;
+  return html`<main class="stage" aria-label="Scene" data-docked=${inCoverage}>
     <iframe
       ref=${frame} title="3D scene: the tracked cameras and the virtual boxes" inert=${filled || isFlat}
       src=${`/scene/${encodeURIComponent(store.sid.value)}/${view}/?fixedDpr=${fixedRatio()}`}
@@ -67,6 +69,7 @@ export function Stage({ view }) {
     ${!ready.value && !filled && !isFlat && html`<div class="cover" role="status">Opening the scene</div>`}
     ${isFlat && html`<${FlatFrame} />`}
     ${!filled && html`<${Overlays} /><${Hints} />`}
+    ${inCoverage && html`<${CoverageDock} />`}
     ${mode === "export" && html`<div class="filled"><${ExportPanel} /></div>`}
     ${mode === "masks" && html`<div class="filled"><${MasksMode} /></div>`}
     ${mode !== "export" && mode !== "masks" && store.tool.value === "points" && html`<div class="filled"><${PointsTool} /></div>`}
