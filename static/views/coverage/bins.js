@@ -62,10 +62,10 @@ function cellRows({ equal_area: { bands, band_edges, counts, reachable } }) {
   );
 }
 
-/** "azimuth −20° to 0°, 40° to 60° from the top". @param {Bin} bin */
+/** "azimuth −20° to 0°, 40° to 60° from top". @param {Bin} bin */
 export function placeWords({ left, right, top, bottom }) {
   const around = right - left > 359.9 ? "all round" : `azimuth ${angle(left)} to ${angle(right)}`;
-  return `${around}, ${angle(top)} to ${angle(bottom)} from the top`;
+  return `${around}, ${angle(top)} to ${angle(bottom)} from top`;
 }
 
 /** "3 views", or why there are none. @param {Bin} bin */
@@ -74,9 +74,9 @@ export function countWords({ count, reachable }) {
   return count === 0 ? "no view" : `${count.toLocaleString("en")} ${count === 1 ? "view" : "views"}`;
 }
 
-/** "1.2 % of all directions". @param {Bin} bin */
+/** "1.2% of the sphere". @param {Bin} bin */
 export function areaWords({ area }) {
-  return `${(100 * area).toFixed(area < 0.0995 ? 1 : 0)}% of all directions`;
+  return `${(100 * area).toFixed(area < 0.0995 ? 1 : 0)}% of the sphere`;
 }
 
 /** @param {number} degrees */

@@ -102,7 +102,7 @@ export function HeatMap({ coverage, stale, name }) {
     </svg>
     <p class="reading" role="status">${read === null
       ? html`<span class="muted">Point at a bin, or walk with the arrow keys; Enter shows its frames.</span>`
-      : html`<strong>${countWords(read)}</strong> <span class="muted">${placeWords(read)} · ${areaWords(read)}</span>`}</p>
+      : html`<strong>${countWords(read)}</strong> <span class="muted">${placeWords(read)}<span class="area"> · ${areaWords(read)}</span></span>`}</p>
     <${Legend} most=${most} hasFolded=${rows.flat().some(({ reachable }) => !reachable)} />
   </div>`;
 }
