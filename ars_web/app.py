@@ -48,6 +48,7 @@ from ars_web.api import (
     segment,
     sessions,
     telling_frames,
+    tour,
 )
 from ars_web.api.body_limit import BodyLimit
 from ars_web.api.credentials import CODE_LIFETIME, Cookies, LoginCodes, install_token
@@ -117,6 +118,7 @@ def create_app(settings: Settings) -> FastAPI:
         sessions,
         classes,
         coverage,
+        tour,
         frames,
         marks,
         labels_preview,

@@ -238,6 +238,23 @@ def whole_numbers(text: str | None, option: str) -> list[int]:
         raise typer.BadParameter(f"{text!r} must be whole numbers with commas between", param_hint=option) from error
 
 
+def number_range(text: str | None, option: str) -> tuple[float, float] | None:
+    """The two numbers of `MIN:MAX`; None where it is None.
+
+    Raises:
+        typer.BadParameter: it is no such pair.
+    """
+    if text is None:
+        return None
+    low, colon, high = text.partition(":")
+    try:
+        if colon:
+            return float(low), float(high)
+    except ValueError:
+        pass
+    raise typer.BadParameter(f"{text!r} must be two numbers with a colon between, such as 0.3:0.8", param_hint=option)
+
+
 def session_name(recording: Path) -> str:
     """What to call a session where nobody said: after the folder, or the file where its name says something."""
     path = recording.resolve()

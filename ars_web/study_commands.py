@@ -60,7 +60,7 @@ def coverage(
         title = f"{snapshot.state.name}: {called(snapshot, box_id=box, class_id=class_id)}"
         out.write_bytes(coverage_png(found, title=title))
     elif out is not None:
-        write_json(out, coverage_json(found))
+        write_json(out, coverage_json(found).model_dump(mode="json"))
     if as_json:
         print_json(coverage_json(found).model_dump(mode="json"))
         return
@@ -79,6 +79,128 @@ def coverage(
             (kind, name, of_part.frames, of_part.views, _percent(of_part.empty_fraction), _percent(of_part.empty_area))
         )
     print_table(("", "of", "frames", "views", "empty bins", "of all directions unseen"), rows)
+    if out is not None:
+        print(out)
+
+
+@app.command()
+def tour(
+    session: take.Session,
+    box: take.OneBox = None,
+    class_name: take.OneClass = None,
+    count: Annotated[int, typer.Option("--count", metavar="N", min=1, max=2000, help="Views at most.")] = 20,
+    distance: Annotated[
+        str | None,
+        typer.Option("--distance", metavar="MIN:MAX", help="Metres to the object; default: as the frames have it."),
+    ] = None,
+    height: Annotated[
+        str | None,
+        typer.Option("--height", metavar="MIN:MAX", help="The camera's z, metres; default: as the frames have it."),
+    ] = None,
+    tilt: Annotated[
+        str | None,
+        typer.Option("--tilt", metavar="MIN:MAX", help="Degrees below the horizontal; default: as the frames have it."),
+    ] = None,
+    min_visible: Annotated[
+        float | None,
+        typer.Option(
+            "--min-visible",
+            metavar="SHARE",
+            help="How much of an object is seen, in frames that count and in views; default: any, and half.",
+        ),
+    ] = None,
+    azimuth_bins: Annotated[
+        int, typer.Option("--azimuth-bins", metavar="N", min=1, max=360, help="Bins round the box's z axis.")
+    ] = 36,
+    polar_bins: Annotated[
+        int, typer.Option("--polar-bins", metavar="N", min=1, max=360, help="Bins from +z down to -z.")
+    ] = 18,
+    shape: take.Shape = None,
+    start_frame: Annotated[
+        int | None, typer.Option("--start-frame", metavar="N", min=0, help="Begin at this frame; default: the last.")
+    ] = None,
+    hand_eye: Annotated[
+        Path | None,
+        typer.Option(
+            "--hand-eye",
+            metavar="FILE",
+            help="x y z qx qy qz qw of the camera in the wrist; default: the recording's own.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FILE", help="Write all (.json), or poses of the wrist as robot_poses (.txt)."),
+    ] = None,
+    sessions: take.Sessions = take.SESSIONS,
+    as_json: take.Json = False,
+) -> None:
+    """Where to look next: camera poses that fill what no frame has seen of the objects, as a short tour.
+
+    Each view shows its object whole, large enough and not behind others, and keeps to the limits and 5 cm from every
+    box. What stands between two views is not looked at: getting there is the robot's to plan.
+    """
+    import math
+
+    from ars_web.datasets.coverage import chosen_boxes, session_views
+    from ars_web.errors import BadInput
+    from ars_web.geometry.sphere_bins import SphereBins
+    from ars_web.recordings.ars import camera_in_wrist
+    from ars_web.sessions.store import SessionStore
+    from ars_web.studies.tour import TourRequest, plan_tour, recorded_wrist
+    from ars_web.studies.tour_json import tour_json, wrist_rows
+
+    if out is not None and out.suffix.lower() not in (".json", ".txt"):
+        raise typer.BadParameter(f"{out} ends neither in .json nor in .txt", param_hint="--out")
+    if box is not None and class_name is not None:
+        raise typer.BadParameter("give --box or --class, not both: a box is of one class", param_hint="--class")
+    degrees = take.number_range(tilt, "--tilt")
+    request = TourRequest(
+        bins=SphereBins(azimuth_bins, polar_bins),
+        count=count,
+        distance=take.number_range(distance, "--distance"),
+        height=take.number_range(height, "--height"),
+        tilt=None if degrees is None else (math.radians(degrees[0]), math.radians(degrees[1])),
+        min_visible=min_visible,
+        shape=shape,
+        start_frame=start_frame,
+    )
+    with SessionStore(sessions) as store:
+        summary = store.summary(store.find(session))
+        snapshot = store.snapshot(summary.id)
+    class_id = None if class_name is None else take.class_named(snapshot.state, class_name).id
+    chosen = chosen_boxes(snapshot, box_id=box, class_id=class_id)
+    if hand_eye is None:
+        wrist = recorded_wrist(summary.format, Path(summary.source))
+        T_wrist_camera, unknown = wrist.T_wrist_camera, wrist.unknown
+    else:
+        T_wrist_camera, unknown = camera_in_wrist(hand_eye), None
+    wants_wrist = out is not None and out.suffix.lower() == ".txt"
+    if wants_wrist and T_wrist_camera is None:
+        raise BadInput(f"{out} is to hold poses of the wrist, but {unknown}; give --hand-eye FILE, or write a .json")
+    found = plan_tour(snapshot, session_views(snapshot, request.options), chosen, request)
+    told = tour_json(found, T_wrist_camera=T_wrist_camera)
+    if out is not None and T_wrist_camera is not None and wants_wrist:
+        out.write_text(wrist_rows(found, T_wrist_camera))
+    elif out is not None:
+        write_json(out, told.model_dump(mode="json"))
+    if as_json:
+        print_json(told.model_dump(mode="json"))
+        return
+    rows = [
+        (
+            place,
+            snapshot.state.boxes[stop.box_id].name,
+            " ".join(f"{value:.3f}" for value in stop.T_world_camera[:3, 3]),
+            f"{stop.distance:.3f}",
+            f"{math.degrees(stop.tilt):.1f}",
+            len(stop.labelled),
+            len(stop.fills),
+        )
+        for place, stop in enumerate(found.stops, start=1)
+    ]
+    print_table(("view", "looks at", "camera at x y z", "distance", "tilt", "labels", "fills cells"), rows)
+    for line in found.lines():
+        print(line)
     if out is not None:
         print(out)
 

@@ -15,7 +15,8 @@ from ars_web.datasets.options import ExportOptions
 from ars_web.datasets.samples import kept, labels_in_frames
 from ars_web.datasets.shapes import check_shape, meshes_of
 from ars_web.errors import BadInput, NotFound
-from ars_web.geometry.sphere_bins import NOWHERE, SphereBins
+from ars_web.geometry.frame_blocks import over_blocks
+from ars_web.geometry.sphere_bins import SphereBins
 from ars_web.geometry.symmetry import Symmetry
 from ars_web.geometry.view_directions import reachable, view_directions
 from ars_web.sessions.model import SessionSnapshot
@@ -114,11 +115,18 @@ def session_views(
 def coverage_of(views: SessionViews, bins: SphereBins, rows: Sequence[int]) -> Coverage:
     """The histograms of the boxes at `rows`, one or more, together."""
     chosen = list(rows)
+
+    def look(places: slice) -> Int[np.ndarray, "2 k"]:
+        # NOWHERE is -1: one place further on, it is the first.
+        counts = np.zeros((2, bins.cells + 1), dtype=np.int64)
+        for row in chosen[places]:
+            for kind, found in enumerate(bins.of(views.directions[row])):
+                counts[kind] += np.bincount(found[views.counted[row]] + 1, minlength=bins.cells + 1)
+        return counts
+
+    found = np.sum(over_blocks(look, len(chosen), block=1), axis=0)
+    angle_counts, cell_counts = found[:, 1:]
     counted = views.counted[chosen]
-    angles, cells = bins.of(views.directions[chosen][counted])
-    # NOWHERE is -1: one place further on, it is the first, which is left out.
-    angle_counts = np.bincount(angles + 1, minlength=bins.cells + 1)[1:]
-    cell_counts = np.bincount(cells + 1, minlength=bins.cells + 1)[1:]
     angles_reachable, cells_reachable = np.zeros(bins.cells, dtype=bool), np.zeros(bins.cells, dtype=bool)
     for symmetry in {views.symmetries[row] for row in chosen}:
         of_angles, of_cells = reachable(bins, symmetry)
@@ -133,8 +141,8 @@ def coverage_of(views: SessionViews, bins: SphereBins, rows: Sequence[int]) -> C
         cell_counts=cell_counts,
         cells_reachable=cells_reachable | (cell_counts > 0),
         frames=int(counted.any(axis=0).sum()),
-        views=len(angles),
-        away=int((angles == NOWHERE).sum()),
+        views=int(counted.sum()),
+        away=int(found[0, 0]),
     )
 
 

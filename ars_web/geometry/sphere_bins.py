@@ -104,8 +104,11 @@ class SphereBins:
         first_polar, first_band = _first_bands(polar_z), _first_bands(self.band_edges)
 
         def look(rows: slice) -> None:
+            # NumPy's arctan2 takes several at a time, which the compiled loop's does not.
+            phi = np.arctan2(given[rows, 1], given[rows, 0])
             sphere_kernels.bins_of_directions(
                 given[rows],
+                phi,
                 self.azimuth,
                 polar_z,
                 first_polar,

@@ -38,6 +38,7 @@ def band_at(z: float, edges: Array, first_band: Array) -> int:
 @entry
 def bins_of_directions(
     directions: Array,
+    phi: Array,
     azimuth: int,
     polar_z: Array,
     first_polar: Array,
@@ -49,8 +50,8 @@ def bins_of_directions(
 ) -> None:
     """The equal-angle bin and the equal-area cell of each direction (n, 3), written to `angles` and `cells` (n,).
 
-    `polar_z` and `band_z` are the edges in z of polar bins and of bands of cells, with where to begin to look as
-    `band_at` has it; `starts` the first cell of each band, and their number.
+    `phi` (n,) are their azimuths; `polar_z` and `band_z` the edges in z of polar bins and of bands of cells, with where
+    to begin to look as `band_at` has it; `starts` the first cell of each band, and their number.
     """
     polar = len(polar_z) - 1
     for i in range(len(directions)):
@@ -61,7 +62,7 @@ def bins_of_directions(
             cells[i] = -1
             continue
         z /= length
-        turn = (np.arctan2(y, x) + np.pi) / (2.0 * np.pi)
+        turn = (phi[i] + np.pi) / (2.0 * np.pi)
         angles[i] = min(int(turn * azimuth), azimuth - 1) * polar + band_at(z, polar_z, first_polar)
         band = band_at(z, band_z, first_band)
         wide = starts[band + 1] - starts[band]

@@ -11,8 +11,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.colors import Colormap
 
-EMPTY = "#ffffff"
 BEYOND = "#e4e9ee"
+"""Of directions that the symmetry folds elsewhere."""
+
+HOLE = "#d55e00"
+"""Of the dot in a bin without a view."""
 
 
 def coverage_png(coverage: Coverage, *, title: str) -> bytes:
@@ -30,7 +33,7 @@ def coverage_png(coverage: Coverage, *, title: str) -> bytes:
     shown = above.pcolormesh(azimuth, polar, angles.T, cmap=colours, vmin=0, vmax=most)
     middles = (azimuth[:-1] + azimuth[1:]) / 2, (polar[:-1] + polar[1:]) / 2
     holes = np.argwhere(coverage.reachable & (coverage.counts == 0))
-    above.plot(middles[0][holes[:, 0]], middles[1][holes[:, 1]], ".", color="#d55e00", markersize=2.5)
+    above.plot(middles[0][holes[:, 0]], middles[1][holes[:, 1]], ".", color=HOLE, markersize=2.5)
     above.set_title(
         f"{title}\n{coverage.views} views in {coverage.frames} frames; {coverage.empty_fraction:.0%} of the"
         f" {bins.azimuth} x {bins.polar} bins are empty",
@@ -49,7 +52,7 @@ def coverage_png(coverage: Coverage, *, title: str) -> bytes:
         strip = cells[None, first : first + count]
         shown = below.pcolormesh(edges, band_edges[band : band + 2], strip, cmap=colours, vmin=0, vmax=most)
         holes = (edges[:-1] + np.diff(edges) / 2)[strip[0] == 0]
-        below.plot(holes, np.full(len(holes), band_edges[band : band + 2].mean()), ".", color="#d55e00", markersize=2.5)
+        below.plot(holes, np.full(len(holes), band_edges[band : band + 2].mean()), ".", color=HOLE, markersize=2.5)
     below.set_title(
         f"{bins.cells} cells of equal area; {coverage.empty_area:.0%} of all directions have no view",
         fontsize=11,
@@ -62,17 +65,13 @@ def coverage_png(coverage: Coverage, *, title: str) -> bytes:
 
 
 def _colours() -> "Colormap":
+    """From dark to light as views get more; white where there are none."""
     from matplotlib import colormaps
-
-    colours = colormaps["viridis"].resampled(256)
-    colours.set_bad(BEYOND)
-    seen = colours(np.linspace(0.12, 1.0, 256))
-    seen[0] = (1.0, 1.0, 1.0, 1.0)
     from matplotlib.colors import ListedColormap
 
-    made = ListedColormap(seen)
-    made.set_bad(BEYOND)
-    return made
+    seen = colormaps["viridis"](np.linspace(0.12, 1.0, 256))
+    seen[0] = (1.0, 1.0, 1.0, 1.0)
+    return ListedColormap(seen).with_extremes(bad=BEYOND)
 
 
 def _frame(axes: "Axes") -> None:
