@@ -438,6 +438,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/sessions/{sid}/coverage/tour": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Plan
+         * @description Views that fill the empty cells of objects' coverage, as a short tour. Nothing is stored.
+         */
+        post: operations["tour-plan"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/sessions/{sid}/frames": {
         parameters: {
             query?: never;
@@ -1771,6 +1791,22 @@ export interface components {
             distortion: number[];
         };
         /**
+         * CellLeftJson
+         * @description An empty cell that no view of the tour fills.
+         */
+        CellLeftJson: {
+            /** Box Id */
+            box_id: number;
+            /** Cell */
+            cell: number;
+            /**
+             * Reason
+             * @description what hinders the pose that got furthest; later: ask for more views
+             * @enum {string}
+             */
+            reason: "height" | "tilt" | "near" | "large" | "small" | "hidden" | "later";
+        };
+        /**
          * ChoiceJson
          * @description One value that an option can have.
          */
@@ -2315,6 +2351,29 @@ export interface components {
              * @description over the label files: the SHA-256 of what `sha256sum` prints for them in byte order of their paths
              */
             sha256: string;
+        };
+        /**
+         * FillJson
+         * @description An empty cell that a view fills.
+         */
+        FillJson: {
+            /** Box Id */
+            box_id: number;
+            /**
+             * Cell
+             * @description of equal area, as the coverage counts them
+             */
+            cell: number;
+            /**
+             * Azimuth
+             * @description of the view in the box's frame, folded by the symmetry, radians
+             */
+            azimuth: number;
+            /**
+             * Polar
+             * @description likewise, from +z
+             */
+            polar: number;
         };
         /**
          * FitJson
@@ -3876,6 +3935,31 @@ export interface components {
             polygons: components["schemas"]["PolygonAnswer"][];
         };
         /**
+         * PoseJson
+         * @description A rigid transform.
+         */
+        PoseJson: {
+            /**
+             * Position
+             * @description metres
+             */
+            position: [
+                number,
+                number,
+                number
+            ];
+            /**
+             * Wxyz
+             * @description unit quaternion, w first and >= 0
+             */
+            wxyz: [
+                number,
+                number,
+                number,
+                number
+            ];
+        };
+        /**
          * PreviewBoxJson
          * @description A box as it would be.
          */
@@ -4459,6 +4543,202 @@ export interface components {
                 number,
                 number
             ];
+        };
+        /**
+         * TourDraft
+         * @description Which views are wanted.
+         */
+        TourDraft: {
+            /**
+             * Box Ids
+             * @description absent: all objects
+             */
+            box_ids?: number[] | null;
+            /**
+             * Class Id
+             * @description the objects of a class
+             */
+            class_id?: number | null;
+            /**
+             * Count
+             * @description views at most
+             * @default 20
+             */
+            count: number;
+            /**
+             * Distance
+             * @description metres to the object looked at; absent: as the frames have it
+             */
+            distance?: [
+                number,
+                number
+            ] | null;
+            /**
+             * Height
+             * @description z of the camera in the world, metres; absent: as the frames have it
+             */
+            height?: [
+                number,
+                number
+            ] | null;
+            /**
+             * Tilt
+             * @description of the camera's axis below the horizontal, radians; absent: likewise
+             */
+            tilt?: [
+                number,
+                number
+            ] | null;
+            /**
+             * Min Visible
+             * @description share of an object that is seen, in frames that count and in views proposed; absent: frames count as in the coverage without it, and views show at least half
+             */
+            min_visible?: number | null;
+            /** Shape */
+            shape?: ("box" | "hull" | "mesh") | null;
+            /**
+             * Azimuth Bins
+             * @default 36
+             */
+            azimuth_bins: number;
+            /**
+             * Polar Bins
+             * @default 18
+             */
+            polar_bins: number;
+            /**
+             * Start Frame
+             * @description frame at which the tour begins; absent: the last
+             */
+            start_frame?: number | null;
+        };
+        /**
+         * TourJson
+         * @description Views that fill empty cells of objects' coverage, in the order of a short tour. What stands between them is not
+         *     looked at: how to get from one to the next is the robot's to plan.
+         */
+        TourJson: {
+            /** Views */
+            views: components["schemas"]["TourViewJson"][];
+            /** @description camera pose at which the tour begins */
+            start: components["schemas"]["PoseJson"];
+            /**
+             * Length
+             * @description metres from the start through all views
+             */
+            length: number;
+            /**
+             * Turn
+             * @description radians that the camera turns on the way
+             */
+            turn: number;
+            limits: components["schemas"]["TourLimitsJson"];
+            /**
+             * Cells
+             * @description of all chosen objects, those that their symmetry leaves
+             */
+            cells: number;
+            /**
+             * Cells Empty
+             * @description of them, those that no frame lies in
+             */
+            cells_empty: number;
+            /**
+             * Cells Filled
+             * @description of the empty ones, those that the views fill
+             */
+            cells_filled: number;
+            /**
+             * Cells Left
+             * @description the other empty ones
+             */
+            cells_left: components["schemas"]["CellLeftJson"][];
+            /** Left By Reason */
+            left_by_reason: {
+                [key: string]: number;
+            };
+        };
+        /**
+         * TourLimitsJson
+         * @description What the views keep to.
+         */
+        TourLimitsJson: {
+            /**
+             * Distance
+             * @description metres
+             */
+            distance: [
+                number,
+                number
+            ];
+            /**
+             * Height
+             * @description metres
+             */
+            height: [
+                number,
+                number
+            ];
+            /**
+             * Tilt
+             * @description radians
+             */
+            tilt: [
+                number,
+                number
+            ];
+            /** Min Visible */
+            min_visible: number;
+            /**
+             * Clearance
+             * @description metres to the nearest box
+             */
+            clearance: number;
+            /**
+             * From Recording
+             * @description those that nobody gave: as the recording's frames are, widened
+             */
+            from_recording: string[];
+        };
+        /**
+         * TourViewJson
+         * @description A view to take.
+         */
+        TourViewJson: {
+            /** @description OpenCV camera axes: x right, y down, z forward */
+            T_world_camera: components["schemas"]["PoseJson"];
+            /** @description of the wrist that holds the camera; null: unknown how it does */
+            T_world_wrist: components["schemas"]["PoseJson"] | null;
+            /**
+             * Box Id
+             * @description the object looked at; the image's x is horizontal
+             */
+            box_id: number;
+            /**
+             * Boxes
+             * @description ids of all boxes that an export would label there
+             */
+            boxes: number[];
+            /**
+             * Fills
+             * @description cells that no frame and no view chosen before it fills
+             */
+            fills: components["schemas"]["FillJson"][];
+            /**
+             * Distance
+             * @description metres to the centre of the object looked at
+             */
+            distance: number;
+            /**
+             * Height
+             * @description z in the world, metres
+             */
+            height: number;
+            /**
+             * Tilt
+             * @description of the camera's axis below the horizontal, radians
+             */
+            tilt: number;
         };
         /**
          * TransformAnswer
@@ -7583,6 +7863,107 @@ export interface operations {
             };
             /** @description a thing named in the path is not there */
             404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "tour-plan": {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description a repeat with the same key answers what the first answered, and does nothing */
+                "idempotency-key"?: string | null;
+            };
+            path: {
+                sid: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["TourDraft"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TourJson"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description beyond a limit, which the detail names */
+            413: {
                 headers: {
                     [name: string]: unknown;
                 };

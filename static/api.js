@@ -290,6 +290,9 @@ export function coverageFrames(sid, of, counting, { by, index }, signal) {
 export const coverageAddress = (sid, of, counting, as) =>
   under(sid, `/coverage${as === "png" ? "/picture" : ""}?${query({ ...of, ...counted(counting) })}`);
 
+/** @param {string} sid @param {object} wish @returns {Promise<Schemas["TourJson"]>} */
+export const planTour = (sid, wish) => request("POST", under(sid, "/coverage/tour"), { body: wish, key: true });
+
 // Exports.
 
 /** @returns {Promise<Schemas["FormatsJson"]>} */

@@ -89,6 +89,7 @@ Object.assign(
     coverage: (of, counting, signal) => api.coverage(sid(), of, counting, signal),
     coverageOfObjects: async (counting, signal) => (await api.coverageOfObjects(sid(), counting, signal)).items,
     coverageFrames: (of, counting, direction, signal) => api.coverageFrames(sid(), of, counting, direction, signal),
+    planTour: (wish) => api.planTour(sid(), wish),
     coverageAddress: (of, counting, as) => api.coverageAddress(sid(), of, counting, as),
 
     formats: api.formats,

@@ -39,6 +39,7 @@ import { computed, signal } from "./lib/view.js";
  */
 
 /** From where objects are seen. @typedef {Schemas["CoverageJson"]} Coverage */
+/** Where to look next. @typedef {Schemas["TourJson"]} Tour */
 /** Whose views are counted: an object's, or those of a class's objects together. @typedef {{box_id: number} | {class_id: number}} Seen */
 /** How views are counted: degrees a bin is wide, and how much of an object a view must show. @typedef {{degrees: number, min_visible: number}} Counting */
 /** A bin of equal angles, azimuth bin * polar bins + polar bin, or a cell of equal area. @typedef {{by: "angle" | "area", index: number}} Direction */
@@ -290,6 +291,7 @@ export function setProblem(place, text) {
  * @property {(counting: Counting, signal?: AbortSignal) => Promise<readonly Schemas["ObjectCoverage"][]>} coverageOfObjects boxes, then classes
  * @property {(of: Seen, counting: Counting, direction: Direction, signal?: AbortSignal) => Promise<Schemas["BinFrames"]>} coverageFrames
  * @property {(of: Seen, counting: Counting, as: "json" | "png") => string} coverageAddress
+ * @property {(wish: object) => Promise<Tour>} planTour where to look next
  *
  * @property {() => Promise<Session[]>} sessions
  * @property {(session: Session, name: string) => Promise<Session>} renameOf

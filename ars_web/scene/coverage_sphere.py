@@ -46,18 +46,21 @@ RADIUS = 0.85
 HEAT = ("#472a7a", "#39568c", "#297b8e", "#1f9f88", "#46c06f", "#9dd93b", "#fde725")
 """From one view to the most; viridis, as in the page's tokens (--heat-1 to --heat-7)."""
 
-HOLE = {True: "#1c242e", False: "#ffffff"}
-"""A direction without a view, by whether the page is dark."""
+HOLE = {True: "#3a4653", False: "#ffffff"}
+"""A direction without a view, by whether the page is dark: as far from what is behind it as it may be, and no heat."""
 
 HOLE_DOT = {True: "#f0a839", False: "#b35c00"}
 
-SEEN_OPACITY, HOLE_OPACITY = 0.84, 0.5
+SEEN_OPACITY, HOLE_OPACITY = 0.88, 0.42
 
 GAP = math.radians(0.45)
 DOT = math.radians(1.5)
 
 CHOSEN_WIDTH, HALO_WIDTH = 3.0, 7.0
 """Pixels, of the outline of what is chosen and of what sets it off from any colour."""
+
+ABOVE_HALO = 1.012
+"""Where the outline is drawn, in halo's radii: at one depth the two would show through each other."""
 
 CHOSEN, HALO = (255, 255, 255), (13, 17, 23)
 
@@ -263,11 +266,11 @@ class CoverageSphere:
                     f"{COVERAGE}/chosen", lines, CHOSEN, thickness=CHOSEN_WIDTH, thickness_units="screen", scale=radius
                 ),
             )
-        for outline in self._outline:
+        for outline, above in zip(self._outline, (1.0, ABOVE_HALO), strict=True):
             outline.visible = len(lines) > 0
             if len(lines):
                 outline.points = lines
-            outline.scale = radius
+            outline.scale = above * radius
 
 
 def chosen_lines(sight: CoverageSight, symmetry: Symmetry) -> Float[np.ndarray, "m 2 3"]:
@@ -282,7 +285,7 @@ def chosen_lines(sight: CoverageSight, symmetry: Symmetry) -> Float[np.ndarray, 
         return np.zeros((0, 2, 3))
     alike = np.flatnonzero(stand_in == chosen)
     # One that is cut by the edge of what directions are folded to may stand for no whole one.
-    return 1.008 * outlines(patches[alike if len(alike) else [chosen]])
+    return 1.006 * outlines(patches[alike if len(alike) else [chosen]])
 
 
 def _equal(a: SphereCounts, b: SphereCounts) -> bool:

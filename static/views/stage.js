@@ -27,6 +27,7 @@ export function Stage({ view }) {
         ready.value = true;
         tellBridge();
         tellNames();
+        tellNumbers();
       } else if (told?.ars === "key" && told.type === "keydown") {
         press({ key: told.key, code: told.code, ctrlKey: told.ctrl, metaKey: told.meta, shiftKey: told.shift, altKey: told.alt, repeat: told.repeat });
       } else if (told?.ars === "zoom") store.zoom.value = told.zoom;
@@ -53,6 +54,11 @@ export function Stage({ view }) {
     frame.current?.contentWindow?.postMessage({ ars: "names", boxes }, location.origin);
   };
   useSignalEffect(tellNames);
+  const tellNumbers = () => {
+    const at = store.mode.value === "coverage" ? store.tour.value.map(({ position }) => position) : [];
+    frame.current?.contentWindow?.postMessage({ ars: "numbers", at }, location.origin);
+  };
+  useSignalEffect(tellNumbers);
   useSignalEffect(() => {
     if (asked.value !== null) frame.current?.contentWindow?.postMessage(asked.value, location.origin);
   });
@@ -112,6 +118,8 @@ function Overlays() {
           onInput=${(/** @type {any} */ event) => (store.blend.value = Number(event.currentTarget.value))}
         />
       </label>`}
+      ${store.mode.value === "coverage" && store.selected.value !== null &&
+      html`<button class="chip button" onClick=${command("look-selected").run} title="Look at the selected object (L)">Look closer</button>`}
       <button class="chip button" aria-pressed=${store.snapLength.value > 0 || store.snapAngle.value > 0} onClick=${command("snap").run} title="Snap (N)">
         ${snapWords()}
       </button>

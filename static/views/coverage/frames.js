@@ -43,7 +43,7 @@ export function BinFramesView() {
         const name = store.boxes.value.get(box_id)?.name ?? "";
         return html`<li key=${`${frame} ${box_id}`}>
           <button
-            class="tile" tabindex=${i === active ? 0 : -1} data-frame=${frame} data-box=${box_id} aria-label=${`Enter frame ${frame}, which shows ${name}`}
+            class="seen-frame" tabindex=${i === active ? 0 : -1} data-frame=${frame} data-box=${box_id} aria-label=${`Enter frame ${frame}, which shows ${name}`}
             onFocus=${() => (at.value = i)}
             onClick=${() => {
               store.actions.select(box_id);

@@ -1,11 +1,12 @@
 /** The right side in Coverage mode: which object, what is seen of it, how it is counted, and where to look next. */
 
 import { Icon } from "../../lib/icon.js";
-import { html, useEffect, useId, useSignal } from "../../lib/view.js";
+import { html, useEffect, useId, useLayoutEffect, useSignal } from "../../lib/view.js";
 import * as store from "../../store.js";
 import { NoBoxes } from "../new_box.js";
 import { coverage, useObjects } from "./found.js";
 import { Objects } from "./objects.js";
+import { NextViews, PlanViews } from "./next_views.js";
 import { percent } from "./words.js";
 
 export function CoveragePanel() {
@@ -19,16 +20,17 @@ export function CoveragePanel() {
   // A direction is one of an object: others have other frames there.
   const of = JSON.stringify(store.seen.value);
   const last = useSignal(of);
-  useEffect(() => {
+  useLayoutEffect(() => {
     if (last.peek() !== of) store.direction.value = null;
     last.value = of;
   }, [of]);
   if (store.seen.value === null) return html`<section class="panel-section"><${NoBoxes} /></section>`;
-  return html`<${Objects} /><${Numbers} /><${HowCounted} />`;
+  return html`<${Objects} /><${Numbers} /><${HowCounted} /><${NextViews} />`;
 }
 
+/** The main button. */
 export function CoverageWayOn() {
-  return null;
+  return store.seen.value === null ? null : html`<${PlanViews} />`;
 }
 
 function Numbers() {
