@@ -46,7 +46,7 @@ RADIUS = 0.85
 HEAT = ("#472a7a", "#39568c", "#297b8e", "#1f9f88", "#46c06f", "#9dd93b", "#fde725")
 """From one view to the most; viridis, as in the page's tokens (--heat-1 to --heat-7)."""
 
-HOLE = {True: "#3a4653", False: "#ffffff"}
+HOLE = {True: "#3a4653", False: "#8e9caa"}
 """A direction without a view, by whether the page is dark: as far from what is behind it as it may be, and no heat."""
 
 HOLE_DOT = {True: "#f0a839", False: "#b35c00"}

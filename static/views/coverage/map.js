@@ -34,6 +34,7 @@ export function HeatMap({ coverage, stale, name }) {
 
   /** @param {Bin} bin */
   const go = (bin) => {
+    focused.value = true;
     active.value = bin.index;
     const cell = grid.current?.querySelector(`[data-index="${bin.index}"]`);
     if (cell instanceof SVGElement) cell.focus();
@@ -66,7 +67,7 @@ export function HeatMap({ coverage, stale, name }) {
     <svg
       ref=${grid} viewBox="-212 -5 398 200" role="grid" aria-label=${`Views of ${name} by direction`} aria-busy=${stale}
       onKeyDown=${keys} onPointerOver=${(/** @type {Event} */ event) => (hovered.value = under(event))} onPointerLeave=${() => (hovered.value = null)}
-      onFocusIn=${() => (focused.value = true)} onFocusOut=${() => (focused.value = false)}
+      onFocusIn=${(/** @type {any} */ event) => (focused.value = event.target.matches(":focus-visible"))} onFocusOut=${() => (focused.value = false)}
       onClick=${(/** @type {Event} */ event) => {
         const bin = all.get(under(event) ?? -1);
         if (bin !== undefined) choose(bin);
@@ -101,7 +102,7 @@ export function HeatMap({ coverage, stale, name }) {
       </g>
     </svg>
     <p class="reading" role="status">${read === null
-      ? html`<span class="muted">Point at a bin, or walk with the arrow keys; Enter shows its frames.</span>`
+      ? html`<span class="muted">Arrow keys walk the bins; Enter or a click shows frames.</span>`
       : html`<strong>${countWords(read)}</strong> <span class="muted">${placeWords(read)}<span class="area"> · ${areaWords(read)}</span></span>`}</p>
     <${Legend} most=${most} hasFolded=${rows.flat().some(({ reachable }) => !reachable)} />
   </div>`;

@@ -2,7 +2,7 @@
 
 import { Icon } from "../../lib/icon.js";
 import { fixed, millimetres } from "../../lib/quantity.js";
-import { html, useEffect, useId, useMemo } from "../../lib/view.js";
+import { html, useEffect, useId, useMemo, useRef } from "../../lib/view.js";
 import * as store from "../../store.js";
 import { count, forget, limits, make, mistakes, ofAll, plan, planning, problem, wristRows } from "./plan.js";
 import { seenName } from "./words.js";
@@ -33,17 +33,17 @@ export function NextViews() {
   const wrong = mistakes.value;
   return html`<section class="panel-section next-views" aria-label="Where to look next">
     <h2 class="heading section-head">Where to look next</h2>
-    <div class="option"><label for=${`${id}-of`}>For</label>
+    <div class="setting"><label for=${`${id}-of`}>For</label>
       <select class="field wide" id=${`${id}-of`} value=${ofAll.value ? "all" : "seen"} onChange=${(/** @type {any} */ event) => (ofAll.value = event.currentTarget.value === "all")}>
         <option value="seen">${seenName()}</option><option value="all">all objects</option>
       </select>
     </div>
-    <div class="option"><label for=${`${id}-count`}>Views at most</label>
+    <div class="setting"><label for=${`${id}-count`}>Views at most</label>
       <input class="field" id=${`${id}-count`} inputmode="numeric" value=${count.value} aria-invalid=${wrong.has("count")} onInput=${(/** @type {any} */ event) => (count.value = event.currentTarget.value.trim())} />
     </div>
     <${Mistake} of="count" />
     ${LIMITS.map(
-      ([name, title, unit, meaning]) => html`<div class="option" key=${name} role="group" aria-label=${title} title=${meaning}><span>${title}</span>
+      ([name, title, unit, meaning]) => html`<div class="setting" key=${name} role="group" aria-label=${title} title=${meaning}><span>${title}</span>
           <span class="with-unit">${["least", "most"].map(
             (which, i) => html`<input
               key=${which} class="field limit" aria-label=${`${title}, ${which}`} placeholder=${usual(name, i)} value=${limits.value[name][i]} aria-invalid=${wrong.has(name)} spellcheck=${false}
@@ -91,7 +91,9 @@ export function PlanViews() {
 function Result({ tour, stale }) {
   const { views, cells_empty, cells_filled, length } = tour;
   const chosen = store.direction.value;
-  return html`<div class="tour" data-stale=${stale} aria-label="Planned views" role="group">
+  const root = useRef(/** @type {HTMLElement | null} */ (null));
+  useEffect(() => root.current?.scrollIntoView({ block: "nearest" }), [tour]);
+  return html`<div class="tour" ref=${root} data-stale=${stale} aria-label="Planned views" role="group">
     <p role="status">${views.length === 0
       ? cells_empty === 0 ? "Every direction has been seen: there is nothing to fill." : "No view within these limits fills a hole. Allow more."
       : html`<strong>${views.length} ${views.length === 1 ? "view" : "views"}</strong> fill ${cells_filled.toLocaleString("en")} of ${cells_empty.toLocaleString("en")} holes, on a way of ${length.toFixed(2)} m.`}

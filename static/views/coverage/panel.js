@@ -69,7 +69,7 @@ function HowCounted() {
     store.counting.value = { ...store.counting.peek(), min_visible: share / 100 };
   };
   return html`<section class="panel-section counting" aria-label="How it is counted">
-    <div class="option"><label for=${`${id}-bins`}>Size of a bin</label>
+    <div class="setting"><label for=${`${id}-bins`}>Size of a bin</label>
       <select
         class="field" id=${`${id}-bins`} value=${degrees}
         onChange=${(/** @type {any} */ event) => {
@@ -78,7 +78,7 @@ function HowCounted() {
         }}
       >${WIDTHS.map((width) => html`<option key=${width} value=${width}>${width}°</option>`)}</select>
     </div>
-    <div class="option"><label for=${`${id}-visible`}>At least visible</label>
+    <div class="setting"><label for=${`${id}-visible`}>At least visible</label>
       <span class="with-unit"><input
         class="field number" id=${`${id}-visible`} inputmode="decimal" value=${typed.value ?? String(+(100 * min_visible).toFixed(2))} aria-invalid=${problem.value !== null}
         title="Views in which less of the object is seen do not count" aria-describedby=${problem.value === null ? undefined : `${id}-problem`}
