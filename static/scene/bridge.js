@@ -491,6 +491,7 @@
       .map((point, i) => {
         const chip = hiddenOver("ars-number");
         chip.textContent = String(i + 1);
+        document.body.append(chip);
         return { point, chip };
       });
   }
@@ -510,7 +511,6 @@
       const shown = ahead && view.mode === "scene" && Math.abs(at.x) < 1 && Math.abs(at.y) < 1;
       if (chip.hidden === shown) chip.hidden = !shown;
       if (!shown) continue;
-      if (!chip.isConnected) document.body.append(chip);
       const [x, y] = [left + ((at.x + 1) / 2) * width, top + ((1 - at.y) / 2) * height];
       chip.style.transform = `translate(-50%, -50%) translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
     }
