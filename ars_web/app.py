@@ -167,10 +167,12 @@ def _lifespan(settings: Settings, segmenter: Segmenter) -> Callable[[FastAPI], A
             import_jobs = ImportJobs(store, uploads)
             editor = SessionEditor(store)
             outlines = OutlineJobs(store, editor)
+            kept_views = KeptViews()
             try:
                 uploads.sweep()
                 jobs.resume_unfinished()
-                async with EventHub(store).running() as hub, _closing(SceneServers(store, editor)) as scenes:
+                scene_servers = SceneServers(store, editor, kept_views=kept_views)
+                async with EventHub(store).running() as hub, _closing(scene_servers) as scenes:
                     unlisten = editor.listen(hub.wake)
                     app.state.services = Services(
                         store=store,
@@ -199,7 +201,7 @@ def _lifespan(settings: Settings, segmenter: Segmenter) -> Callable[[FastAPI], A
                         largest_upload=settings.largest_upload,
                         pictures=Pictures(),
                         telling=TellingViews(store),
-                        views=KeptViews(),
+                        views=kept_views,
                     )
                     try:
                         yield

@@ -355,6 +355,109 @@ export interface paths {
         patch: operations["classes-change"];
         trace?: never;
     };
+    "/api/sessions/{sid}/coverage": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Read
+         * @description The paper's histogram of viewpoints, and one with cells of equal area.
+         *
+         *     A frame counts where an export with these options would label the object. Views that a class's symmetry makes look
+         *     alike count as one, in the bin that stands for them all.
+         */
+        get: operations["coverage-read"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/coverage/picture": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Picture
+         * @description The same as a picture, for a paper or a notebook.
+         */
+        get: operations["coverage-picture"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/coverage/frames": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Frames
+         * @description The frames that see an object from one bin.
+         */
+        get: operations["coverage-frames-list"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/coverage/objects": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Objects
+         * @description How much is seen of each object and class: where a recording lacks most. Empty where there is no box.
+         */
+        get: operations["coverage-objects-list"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/coverage/tour": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Plan
+         * @description Views that fill the empty cells of objects' coverage, as a short tour. Nothing is stored.
+         */
+        post: operations["tour-plan"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/sessions/{sid}/frames": {
         parameters: {
             query?: never;
@@ -1344,6 +1447,19 @@ export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
         /**
+         * BinFrames
+         * @description The views of a bin, frame by frame.
+         */
+        BinFrames: {
+            /** Total */
+            total: number;
+            /**
+             * Items
+             * @description the first of them, `limit` at most, spread evenly over all
+             */
+            items: components["schemas"]["ViewJson-Output"][];
+        };
+        /**
          * BoxAnswer
          * @description A virtual box; its ETag is its revision.
          */
@@ -1424,7 +1540,7 @@ export interface components {
             /** Class Id */
             class_id: number;
             /** Views */
-            views: components["schemas"]["ViewJson"][];
+            views: components["schemas"]["ViewJson-Input"][];
             /**
              * Name
              * @description default: the class's name, with a number where it is taken
@@ -1675,6 +1791,22 @@ export interface components {
             distortion: number[];
         };
         /**
+         * CellLeftJson
+         * @description An empty cell that no view of the tour fills.
+         */
+        CellLeftJson: {
+            /** Box Id */
+            box_id: number;
+            /** Cell */
+            cell: number;
+            /**
+             * Reason
+             * @description what hinders the pose that got furthest; later: ask for more views
+             * @enum {string}
+             */
+            reason: "height" | "tilt" | "near" | "large" | "small" | "hidden" | "later";
+        };
+        /**
          * ChoiceJson
          * @description One value that an option can have.
          */
@@ -1855,6 +1987,48 @@ export interface components {
             frame: number;
         };
         /**
+         * CoverageJson
+         * @description From where objects are seen: theta = polar angle from +z, phi = azimuth, in the box's frame, radians.
+         */
+        CoverageJson: {
+            /**
+             * Azimuth Edges
+             * @description from -pi to pi
+             */
+            azimuth_edges: number[];
+            /**
+             * Polar Edges
+             * @description from 0 to pi
+             */
+            polar_edges: number[];
+            /**
+             * Counts
+             * @description views by azimuth bin, then by polar bin
+             */
+            counts: number[][];
+            /**
+             * Reachable
+             * @description false: the class's symmetry folds all of the bin elsewhere
+             */
+            reachable: boolean[][];
+            equal_area: components["schemas"]["EqualAreaJson"];
+            /**
+             * Frames
+             * @description in which any of the objects is labelled
+             */
+            frames: number;
+            /**
+             * Views
+             * @description labels of the objects in all frames
+             */
+            views: number;
+            /**
+             * Empty Fraction
+             * @description of the reachable bins of equal angles, those without a view
+             */
+            empty_fraction: number;
+        };
+        /**
          * DuplicateDraft
          * @description Where the copy of a box goes.
          */
@@ -1924,6 +2098,46 @@ export interface components {
                 number,
                 number
             ][][];
+        };
+        /**
+         * EqualAreaJson
+         * @description The cells of equal area.
+         */
+        EqualAreaJson: {
+            /**
+             * Directions
+             * @description the middle of each cell, in the box's frame
+             */
+            directions: [
+                number,
+                number,
+                number
+            ][];
+            /**
+             * Counts
+             * @description views in each cell
+             */
+            counts: number[];
+            /**
+             * Reachable
+             * @description false: the class's symmetry folds all directions of the cell elsewhere
+             */
+            reachable: boolean[];
+            /**
+             * Bands
+             * @description cells in each band from +z downward; they follow one another by azimuth
+             */
+            bands: number[];
+            /**
+             * Band Edges
+             * @description z of the bands' edges, from 1 down to -1
+             */
+            band_edges: number[];
+            /**
+             * Empty Fraction
+             * @description of the reachable cells: the share of all directions without a view
+             */
+            empty_fraction: number;
         };
         /**
          * ExportDraft
@@ -2137,6 +2351,29 @@ export interface components {
              * @description over the label files: the SHA-256 of what `sha256sum` prints for them in byte order of their paths
              */
             sha256: string;
+        };
+        /**
+         * FillJson
+         * @description An empty cell that a view fills.
+         */
+        FillJson: {
+            /** Box Id */
+            box_id: number;
+            /**
+             * Cell
+             * @description of equal area, as the coverage counts them
+             */
+            cell: number;
+            /**
+             * Azimuth
+             * @description of the view in the box's frame, folded by the symmetry, radians
+             */
+            azimuth: number;
+            /**
+             * Polar
+             * @description likewise, from +z
+             */
+            polar: number;
         };
         /**
          * FitJson
@@ -2484,7 +2721,7 @@ export interface components {
          */
         HullPreviewDraft: {
             /** Views */
-            views: components["schemas"]["ViewJson"][];
+            views: components["schemas"]["ViewJson-Input"][];
             /**
              * Widen Px
              * @default 0
@@ -3366,6 +3603,39 @@ export interface components {
             reason: string;
         };
         /**
+         * ObjectCoverage
+         * @description How much of an object, or of a class's objects together, is seen.
+         */
+        ObjectCoverage: {
+            /** Class Id */
+            class_id: number;
+            /**
+             * Box Id
+             * @description null: all of the class
+             */
+            box_id: number | null;
+            /**
+             * Frames
+             * @description in which it is labelled
+             */
+            frames: number;
+            /** Views */
+            views: number;
+            /**
+             * Empty Fraction
+             * @description share of all directions, in cells of equal area, without a view
+             */
+            empty_fraction: number;
+        };
+        /**
+         * ObjectsCoverage
+         * @description All boxes, then all classes that have some.
+         */
+        ObjectsCoverage: {
+            /** Items */
+            items: components["schemas"]["ObjectCoverage"][];
+        };
+        /**
          * ObservationJson
          * @description Where the point is seen in a frame; image coordinates of the original image.
          */
@@ -3663,6 +3933,31 @@ export interface components {
         PolygonsAnswer: {
             /** Polygons */
             polygons: components["schemas"]["PolygonAnswer"][];
+        };
+        /**
+         * PoseJson
+         * @description A rigid transform.
+         */
+        PoseJson: {
+            /**
+             * Position
+             * @description metres
+             */
+            position: [
+                number,
+                number,
+                number
+            ];
+            /**
+             * Wxyz
+             * @description unit quaternion, w first and >= 0
+             */
+            wxyz: [
+                number,
+                number,
+                number,
+                number
+            ];
         };
         /**
          * PreviewBoxJson
@@ -4250,6 +4545,202 @@ export interface components {
             ];
         };
         /**
+         * TourDraft
+         * @description Which views are wanted.
+         */
+        TourDraft: {
+            /**
+             * Box Ids
+             * @description absent: all objects
+             */
+            box_ids?: number[] | null;
+            /**
+             * Class Id
+             * @description the objects of a class
+             */
+            class_id?: number | null;
+            /**
+             * Count
+             * @description views at most
+             * @default 20
+             */
+            count: number;
+            /**
+             * Distance
+             * @description metres to the object looked at; absent: as the frames have it
+             */
+            distance?: [
+                number,
+                number
+            ] | null;
+            /**
+             * Height
+             * @description z of the camera in the world, metres; absent: as the frames have it
+             */
+            height?: [
+                number,
+                number
+            ] | null;
+            /**
+             * Tilt
+             * @description of the camera's axis below the horizontal, radians; absent: likewise
+             */
+            tilt?: [
+                number,
+                number
+            ] | null;
+            /**
+             * Min Visible
+             * @description share of an object that is seen, in frames that count and in views proposed; absent: frames count as in the coverage without it, and views show at least half
+             */
+            min_visible?: number | null;
+            /** Shape */
+            shape?: ("box" | "hull" | "mesh") | null;
+            /**
+             * Azimuth Bins
+             * @default 36
+             */
+            azimuth_bins: number;
+            /**
+             * Polar Bins
+             * @default 18
+             */
+            polar_bins: number;
+            /**
+             * Start Frame
+             * @description frame at which the tour begins; absent: the last
+             */
+            start_frame?: number | null;
+        };
+        /**
+         * TourJson
+         * @description Views that fill empty cells of objects' coverage, in the order of a short tour. What stands between them is not
+         *     looked at: how to get from one to the next is the robot's to plan.
+         */
+        TourJson: {
+            /** Views */
+            views: components["schemas"]["TourViewJson"][];
+            /** @description camera pose at which the tour begins */
+            start: components["schemas"]["PoseJson"];
+            /**
+             * Length
+             * @description metres from the start through all views
+             */
+            length: number;
+            /**
+             * Turn
+             * @description radians that the camera turns on the way
+             */
+            turn: number;
+            limits: components["schemas"]["TourLimitsJson"];
+            /**
+             * Cells
+             * @description of all chosen objects, those that their symmetry leaves
+             */
+            cells: number;
+            /**
+             * Cells Empty
+             * @description of them, those that no frame lies in
+             */
+            cells_empty: number;
+            /**
+             * Cells Filled
+             * @description of the empty ones, those that the views fill
+             */
+            cells_filled: number;
+            /**
+             * Cells Left
+             * @description the other empty ones
+             */
+            cells_left: components["schemas"]["CellLeftJson"][];
+            /** Left By Reason */
+            left_by_reason: {
+                [key: string]: number;
+            };
+        };
+        /**
+         * TourLimitsJson
+         * @description What the views keep to.
+         */
+        TourLimitsJson: {
+            /**
+             * Distance
+             * @description metres
+             */
+            distance: [
+                number,
+                number
+            ];
+            /**
+             * Height
+             * @description metres
+             */
+            height: [
+                number,
+                number
+            ];
+            /**
+             * Tilt
+             * @description radians
+             */
+            tilt: [
+                number,
+                number
+            ];
+            /** Min Visible */
+            min_visible: number;
+            /**
+             * Clearance
+             * @description metres to the nearest box
+             */
+            clearance: number;
+            /**
+             * From Recording
+             * @description those that nobody gave: as the recording's frames are, widened
+             */
+            from_recording: string[];
+        };
+        /**
+         * TourViewJson
+         * @description A view to take.
+         */
+        TourViewJson: {
+            /** @description OpenCV camera axes: x right, y down, z forward */
+            T_world_camera: components["schemas"]["PoseJson"];
+            /** @description of the wrist that holds the camera; null: unknown how it does */
+            T_world_wrist: components["schemas"]["PoseJson"] | null;
+            /**
+             * Box Id
+             * @description the object looked at; the image's x is horizontal
+             */
+            box_id: number;
+            /**
+             * Boxes
+             * @description ids of all boxes that an export would label there
+             */
+            boxes: number[];
+            /**
+             * Fills
+             * @description cells that no frame and no view chosen before it fills
+             */
+            fills: components["schemas"]["FillJson"][];
+            /**
+             * Distance
+             * @description metres to the centre of the object looked at
+             */
+            distance: number;
+            /**
+             * Height
+             * @description z in the world, metres
+             */
+            height: number;
+            /**
+             * Tilt
+             * @description of the camera's axis below the horizontal, radians
+             */
+            tilt: number;
+        };
+        /**
          * TransformAnswer
          * @description A rigid transform.
          */
@@ -4320,7 +4811,7 @@ export interface components {
          * ViewJson
          * @description The object's outline in one frame.
          */
-        ViewJson: {
+        "ViewJson-Input": {
             /**
              * Polygons
              * @description what an odd number of their rings enclose is inside; at most 20000 corners in all
@@ -4333,6 +4824,16 @@ export interface components {
             mask_png?: string | null;
             /** Frame */
             frame: number;
+        };
+        /**
+         * ViewJson
+         * @description A frame that sees an object from the bin.
+         */
+        "ViewJson-Output": {
+            /** Frame */
+            frame: number;
+            /** Box Id */
+            box_id: number;
         };
         /**
          * ViewMisfit
@@ -4424,6 +4925,61 @@ export interface components {
             yours: components["schemas"]["PlacedJson"];
             /** @description as it is now; null: deleted */
             current: components["schemas"]["BoxAnswer"] | null;
+        };
+        /**
+         * CoverageSightJson
+         * @description A sphere round a box: how many views there are of it from each direction.
+         */
+        CoverageSightJson: {
+            /** Box Id */
+            box_id: number;
+            /**
+             * Whole Class
+             * @description count views of all objects of the box's class
+             */
+            whole_class: boolean;
+            /** Azimuth Bins */
+            azimuth_bins: number;
+            /** Polar Bins */
+            polar_bins: number;
+            /**
+             * Min Visible
+             * @description of an object, for a view to count
+             */
+            min_visible: number;
+            /**
+             * Chosen Bin
+             * @description outlined: azimuth bin * polar bins + polar bin
+             * @default null
+             */
+            chosen_bin: number | null;
+            /**
+             * Chosen Cell
+             * @description or a cell of equal area
+             * @default null
+             */
+            chosen_cell: number | null;
+        };
+        /**
+         * DirectionPickedMessage
+         * @description The coverage's sphere was clicked; the direction is folded by the object's symmetry.
+         */
+        DirectionPickedMessage: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "direction";
+            /**
+             * Bin
+             * @description of equal angles: azimuth bin * polar bins + polar bin
+             */
+            bin: number;
+            /**
+             * Cell
+             * @description of equal area
+             */
+            cell: number;
         };
         /**
          * DraggedMessage
@@ -4561,7 +5117,7 @@ export interface components {
          * LiveToPage
          * @description A message from the server to the page.
          */
-        LiveToPage: components["schemas"]["ReadyMessage"] | components["schemas"]["ResetMessage"] | components["schemas"]["EditMessage"] | components["schemas"]["GoneMessage"] | components["schemas"]["HereMessage"] | components["schemas"]["PickedMessage"] | components["schemas"]["EnteredMessage"] | components["schemas"]["DraggedMessage"] | components["schemas"]["ConflictedMessage"] | components["schemas"]["RefusedMessage"];
+        LiveToPage: components["schemas"]["ReadyMessage"] | components["schemas"]["ResetMessage"] | components["schemas"]["EditMessage"] | components["schemas"]["GoneMessage"] | components["schemas"]["HereMessage"] | components["schemas"]["PickedMessage"] | components["schemas"]["DirectionPickedMessage"] | components["schemas"]["EnteredMessage"] | components["schemas"]["DraggedMessage"] | components["schemas"]["ConflictedMessage"] | components["schemas"]["RefusedMessage"];
         /**
          * LookMessage
          * @description Turn the free camera to something.
@@ -4835,6 +5391,17 @@ export interface components {
             hidden: number[];
             /** Dark */
             dark: boolean;
+            /**
+             * @description a sphere in the scene; null: none
+             * @default null
+             */
+            coverage: components["schemas"]["CoverageSightJson"] | null;
+            /**
+             * Tour
+             * @description T_world_camera of cameras proposed next, in their order
+             * @default []
+             */
+            tour: components["schemas"]["TransformJson"][];
         };
         /**
          * ViewsProblem
@@ -6933,6 +7500,493 @@ export interface operations {
                 };
                 content: {
                     "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "coverage-read": {
+        parameters: {
+            query?: {
+                /** @description one object; default: all of them together */
+                box_id?: number | null;
+                /** @description the objects of a class */
+                class_id?: number | null;
+                azimuth_bins?: number;
+                polar_bins?: number;
+                /** @description views in which less of an object is seen do not count */
+                min_visible?: number;
+                /** @description default: the hull where a box has one, else the box */
+                shape?: ("box" | "hull" | "mesh") | null;
+            };
+            header?: never;
+            path: {
+                sid: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CoverageJson"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "coverage-picture": {
+        parameters: {
+            query?: {
+                /** @description one object; default: all of them together */
+                box_id?: number | null;
+                /** @description the objects of a class */
+                class_id?: number | null;
+                azimuth_bins?: number;
+                polar_bins?: number;
+                /** @description views in which less of an object is seen do not count */
+                min_visible?: number;
+                /** @description default: the hull where a box has one, else the box */
+                shape?: ("box" | "hull" | "mesh") | null;
+            };
+            header?: never;
+            path: {
+                sid: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description the histograms as PNG */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "image/png": unknown;
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "coverage-frames-list": {
+        parameters: {
+            query?: {
+                /** @description one object; default: all of them together */
+                box_id?: number | null;
+                /** @description the objects of a class */
+                class_id?: number | null;
+                azimuth_bins?: number;
+                polar_bins?: number;
+                /** @description views in which less of an object is seen do not count */
+                min_visible?: number;
+                /** @description default: the hull where a box has one, else the box */
+                shape?: ("box" | "hull" | "mesh") | null;
+                /** @description a bin of equal angles, with `polar` */
+                azimuth?: number | null;
+                polar?: number | null;
+                /** @description or a cell of equal area */
+                cell?: number | null;
+                limit?: number;
+            };
+            header?: never;
+            path: {
+                sid: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BinFrames"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "coverage-objects-list": {
+        parameters: {
+            query?: {
+                azimuth_bins?: number;
+                polar_bins?: number;
+                /** @description views in which less of an object is seen do not count */
+                min_visible?: number;
+                /** @description default: the hull where a box has one, else the box */
+                shape?: ("box" | "hull" | "mesh") | null;
+            };
+            header?: never;
+            path: {
+                sid: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ObjectsCoverage"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "tour-plan": {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description a repeat with the same key answers what the first answered, and does nothing */
+                "idempotency-key"?: string | null;
+            };
+            path: {
+                sid: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["TourDraft"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TourJson"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description beyond a limit, which the detail names */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
                 };
             };
             /** @description a fault of the server, logged there under the number in the detail */
