@@ -1422,6 +1422,29 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/sessions/{sid}/report": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Read
+         * @description A report of the session as an export with these options would write it; each means what it means there.
+         *
+         *     It comes in seconds also for long sessions: visible shares are then found in some thousand frames alone, unless
+         *     `min_visible` needs them all.
+         */
+        get: operations["report-read"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/login": {
         parameters: {
             query?: never;
@@ -1817,6 +1840,40 @@ export interface components {
             meaning: string;
         };
         /**
+         * ChoiceMade
+         * @description How frames were chosen, where more than their place in the recording decided.
+         *
+         *     A direction is an object seen from one of the cells of equal area round it, where it gets a label.
+         *
+         *     Attributes:
+         *         candidates: frames of the range or the list.
+         *         outside_sector: candidates that stand outside the sector.
+         *         near_twins: of the others, those left out because they are near twins of a chosen frame.
+         *         asked: how many were asked for; None: all that are left.
+         *         chosen: how many were chosen.
+         *         directions_of_candidates: how many directions all candidates show.
+         *         directions: how many the chosen frames show.
+         *         directions_evenly: how many as many evenly spaced frames would, of those that the sector and near twins leave.
+         */
+        ChoiceMade: {
+            /** Candidates */
+            candidates: number;
+            /** Outside Sector */
+            outside_sector: number;
+            /** Near Twins */
+            near_twins: number;
+            /** Asked */
+            asked: number | null;
+            /** Chosen */
+            chosen: number;
+            /** Directions Of Candidates */
+            directions_of_candidates: number;
+            /** Directions */
+            directions: number;
+            /** Directions Evenly */
+            directions_evenly: number;
+        };
+        /**
          * ClassAnswer
          * @description A class; its ETag is its revision.
          */
@@ -2029,6 +2086,19 @@ export interface components {
             empty_fraction: number;
         };
         /**
+         * DirectionsSeen
+         * @description How many directions the frames show objects from. A direction is an object seen from one of the cells of equal
+         *     area round it, where it gets a label; views that look alike by the class's symmetry are one.
+         */
+        DirectionsSeen: {
+            /** All */
+            all: number;
+            /** Splits */
+            splits: {
+                [key: string]: number;
+            };
+        };
+        /**
          * DuplicateDraft
          * @description Where the copy of a box goes.
          */
@@ -2152,6 +2222,9 @@ export interface components {
             /**
              * @default {
              *       "frames": {
+             *         "by": "coverage",
+             *         "near_degrees": 0,
+             *         "near_frames": 0,
              *         "start": 0,
              *         "step": 1
              *       },
@@ -2163,6 +2236,7 @@ export interface components {
              *       "heading_bins": 18,
              *       "split": {
              *         "by": "block",
+             *         "hold_out": [],
              *         "seed": 0,
              *         "test": 0,
              *         "train": 0.8,
@@ -2235,7 +2309,10 @@ export interface components {
             /**
              * @default {
              *       "step": 1,
-             *       "start": 0
+             *       "start": 0,
+             *       "by": "coverage",
+             *       "near_degrees": 0,
+             *       "near_frames": 0
              *     }
              */
             frames: components["schemas"]["FrameChoice"];
@@ -2288,6 +2365,7 @@ export interface components {
              *       "val": 0.2,
              *       "test": 0,
              *       "by": "block",
+             *       "hold_out": [],
              *       "seed": 0
              *     }
              */
@@ -2457,6 +2535,14 @@ export interface components {
              * @description what of the session the format cannot hold, one line each
              */
             losses: string[];
+            directions: components["schemas"]["DirectionsSeen"];
+            /** @description how the frames were chosen, beside all candidates and even spacing; null: by their place alone */
+            choice: components["schemas"]["ChoiceMade"] | null;
+            /**
+             * Notes
+             * @description where the choice or the splits hold less than was asked for, one line each
+             */
+            notes: string[];
             images: components["schemas"]["ImageCounts"];
             /**
              * Image Bytes
@@ -2489,6 +2575,8 @@ export interface components {
         /**
          * FrameChoice
          * @description Which frames of each session: every `step`-th from `start` up to, not including, `stop`; or those listed.
+         *
+         *     Of these only what lies in `sector`, without near twins; and of that `count` frames of all sessions together.
          */
         FrameChoice: {
             /**
@@ -2513,6 +2601,43 @@ export interface components {
              * @description numbers of frames, instead of the three options above
              */
             list?: number[] | null;
+            /**
+             * How many frames
+             * @description so many of all sessions together, chosen from those that the other options leave; empty: all
+             */
+            count?: number | null;
+            /**
+             * Chosen by
+             * @description how that many frames are chosen
+             * @default coverage
+             * @enum {string}
+             */
+            by: "coverage" | "even";
+            /**
+             * Near twins by view
+             * @description a frame that shows its objects from so nearly the same side as a chosen one, and from a distance within a tenth, is left out; 0 keeps all
+             * @default 0
+             */
+            near_degrees: number;
+            /**
+             * Near twins by time
+             * @description frames that are so few frames before or after a chosen one are left out; 0 keeps all
+             * @default 0
+             */
+            near_frames: number;
+            /**
+             * Cameras from one side
+             * @description only cameras between two angles round the objects, in degrees about the world's z axis: 0 to 180 is half the sphere; empty: all round
+             */
+            sector?: [
+                number,
+                number
+            ] | null;
+            /**
+             * Angles round box
+             * @description id of the box that they are about; empty: the middle of all boxes
+             */
+            sector_box?: number | null;
         };
         /**
          * FrameJson
@@ -3044,7 +3169,7 @@ export interface components {
              * @default auto
              * @enum {string}
              */
-            format: "auto" | "bop" | "coco" | "cvat";
+            format: "auto" | "bop" | "coco" | "cvat" | "voc" | "yolo";
             /**
              * Dry Run
              * @description say what would come in, and store nothing
@@ -3666,7 +3791,7 @@ export interface components {
              * @description of its value; integers and texts are lists
              * @enum {string}
              */
-            type: "integer" | "number" | "choice" | "integers" | "texts";
+            type: "integer" | "number" | "choice" | "integers" | "texts" | "range";
             /**
              * Optional
              * @description whether it may be null, which then is its default
@@ -4390,7 +4515,7 @@ export interface components {
          * @description How frames are divided.
          *
          *     `block`: contiguous runs, so that neighbours do not fall on both sides; `frame`: frame by frame at random;
-         *     `session`: whole sessions. Shares must add up to 1.
+         *     `session`: whole sessions; `sector`: by where cameras stand round the objects. Shares must add up to 1.
          */
         SplitChoice: {
             /**
@@ -4417,7 +4542,13 @@ export interface components {
              * @default block
              * @enum {string}
              */
-            by: "block" | "frame" | "session";
+            by: "block" | "frame" | "session" | "sector";
+            /**
+             * Sessions held out
+             * @description of a split by session: these are for validation or test, and all others for training
+             * @default []
+             */
+            hold_out: string[];
             /**
              * Seed
              * @description another number divides the frames another way
@@ -8803,14 +8934,14 @@ export interface operations {
                 "multipart/form-data": {
                     /**
                      * Format: binary
-                     * @description a COCO or CVAT file, or a zip with one, or with a BOP scene and its models
+                     * @description a COCO or CVAT file, or a zip with labels of any format
                      */
                     file: string;
                     /**
                      * @default auto
                      * @enum {string}
                      */
-                    format?: "auto" | "bop" | "coco" | "cvat";
+                    format?: "auto" | "bop" | "coco" | "cvat" | "voc" | "yolo";
                     /**
                      * @default false
                      * @enum {string}
@@ -13657,6 +13788,109 @@ export interface operations {
             };
             /** @description the request comes from another origin */
             403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "report-read": {
+        parameters: {
+            query?: {
+                /** @description every N-th frame */
+                frames_step?: number;
+                frames_start?: number;
+                /** @description default: to the end */
+                frames_stop?: number | null;
+                /** @description default: the hull where a box has one, else the box */
+                shape?: ("box" | "hull" | "mesh") | null;
+                min_visible?: number;
+                max_truncated?: number;
+                min_area_px?: number;
+                split_train?: number;
+                split_val?: number;
+                split_test?: number;
+                split_by?: "block" | "frame";
+                split_seed?: number;
+                /** @description offer it as a file instead of showing it */
+                save?: boolean;
+            };
+            header?: never;
+            path: {
+                sid: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description the page */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/html": string;
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
                 headers: {
                     [name: string]: unknown;
                 };
