@@ -102,9 +102,9 @@ def greedily(views: FrameViews, count: int, *, near: Nearness = NO_TWINS) -> Int
     """At most `count` frames, in the order in which they are chosen: each adds most to those before it.
 
     Fewer where the others are near twins of these. Of frames that add as much the one goes first that comes first
-    in `spread_order`: the first frames of a recording that stands still would be twins of each other.
+    in `tie_order`.
     """
-    order = spread_order(len(views))
+    order = tie_order(views.elements)
     chosen = np.zeros(min(count, len(views)), dtype=np.int64)
     columns = _columns(views.of(order))
     counts = np.zeros(int(columns.elements.max(initial=NOTHING)) + 1, dtype=np.int64)
@@ -135,6 +135,16 @@ def worth(elements: Int[np.ndarray, "n b"], rows: Int[np.ndarray, "k"]) -> tuple
     counts = np.bincount(seen[seen != NOTHING], minlength=1)
     views = selection_kernels.WHOLE // np.arange(1, int(counts.max()) + 1)
     return int((counts > 0).sum()), int(np.concatenate([[0], np.cumsum(views)])[counts].sum())
+
+
+def tie_order(elements: Int[np.ndarray, "n b"]) -> Int[np.ndarray, "n"]:
+    """All n frames, those first that show the element that fewest frames show, so that no twin takes its place; of
+    those that are as rare in `spread_order`: neighbours show nearly the same."""
+    labelled = elements != NOTHING
+    frames_of = np.bincount(elements[labelled], minlength=1)
+    rarest = np.where(labelled, frames_of[np.where(labelled, elements, 0)], len(elements) + 1)
+    order = spread_order(len(elements))
+    return order[np.argsort(rarest.min(axis=1, initial=len(elements) + 1)[order], kind="stable")]
 
 
 def spread_order(n: int) -> Int[np.ndarray, "n"]:

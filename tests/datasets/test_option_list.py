@@ -20,8 +20,8 @@ def test_every_option_is_there_but_those_that_leave_no_choice() -> None:
     assert list(OPTIONS) == [
         "frames.step", "frames.start", "frames.stop", "frames.list", "frames.count", "frames.by",
         "frames.near_degrees", "frames.near_frames", "frames.sector", "frames.sector_box", "images", "shape", "masks",
-        "min_visible", "max_truncated", "min_area_px", "heading_bins", "split.train", "split.val", "split.test", "split.by",
-        "split.hold_out", "split.seed", "sessions",
+        "min_visible", "max_truncated", "min_area_px", "heading_bins", "split.train", "split.val", "split.test",
+        "split.by", "split.hold_out", "split.seed", "sessions",
     ]  # fmt: skip
     assert {name: option.type for name, option in OPTIONS.items() if option.type not in ("integer", "number")} == {
         "frames.list": "integers", "frames.by": "choice", "frames.sector": "range", "images": "choice",
