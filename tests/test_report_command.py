@@ -92,3 +92,18 @@ def test_what_cannot_be_is_one_clear_line(
     assert out == ""
     assert says in " ".join(err.split())
     assert list(Path().glob("*.html")) == []
+
+
+def test_chosen_frames_of_one_side_are_reported_as_the_command_it_names_writes_them(
+    sessions: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    choice = ("--frames-sector", "0:180", "--frames-count", "4", "--split-by", "sector", "--split-val", "0.2")
+    assert report(sessions, *choice, "--json") == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert report(sessions, *choice, "--out", "side.html") == 0
+    assert "sides that cameras look from" in Path("side.html").read_text()
+    assert facts["frames"]["chosen"] == 4
+    words = facts["command"].split()
+    assert words[words.index("--frames-sector") + 1] == "0.0:180.0"
+    assert run([*words[1:], "--sessions", str(sessions)]) == 0
+    assert len(list((tmp_path / "dataset" / "images").rglob("*.jpg"))) == 4

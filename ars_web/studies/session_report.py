@@ -81,7 +81,8 @@ def export_command(snapshot: SessionSnapshot, options: ExportOptions) -> str:
     for name, value in given.items():
         for key, part in value.items() if isinstance(value, dict) else [("", value)]:
             option = "--" + "-".join(filter(None, (name, key))).replace("_", "-")
-            words += [option, ",".join(map(str, part)) if isinstance(part, list | tuple) else str(part)]
+            between = ":" if key == "sector" else ","
+            words += [option, between.join(map(str, part)) if isinstance(part, list | tuple) else str(part)]
     return shlex.join(words)
 
 
