@@ -65,6 +65,6 @@ def score(truth: Path, results: Sequence[Result]) -> Scores:
 
 def _annotations(results: Sequence[Result]) -> list[dict[str, object]]:
     return [
-        {**one.model_dump(), "id": i + 1, "iscrowd": 0, "area": one.bbox[2] * one.bbox[3]}
+        {**one.model_dump(), "bbox": list(one.bbox), "id": i + 1, "iscrowd": 0, "area": one.bbox[2] * one.bbox[3]}
         for i, one in enumerate(results)
     ]
