@@ -21,6 +21,7 @@ from ars_web import __version__
 from ars_web.api import (
     boxes,
     classes,
+    coverage,
     exports,
     folders,
     formats,
@@ -74,6 +75,7 @@ from ars_web.sessions.import_looks import ImportLooks
 from ars_web.sessions.store import SessionStore
 from ars_web.sessions.uploads import Uploads
 from ars_web.settings import Settings
+from ars_web.studies.kept_views import KeptViews
 
 SHUTDOWN_SECONDS = 5
 """How long a server that is stopped waits for answers that are being sent."""
@@ -114,6 +116,7 @@ def create_app(settings: Settings) -> FastAPI:
         imports,
         sessions,
         classes,
+        coverage,
         frames,
         marks,
         labels_preview,
@@ -192,6 +195,7 @@ def _lifespan(settings: Settings, segmenter: Segmenter) -> Callable[[FastAPI], A
                         largest_upload=settings.largest_upload,
                         pictures=Pictures(),
                         telling=TellingViews(store),
+                        views=KeptViews(),
                     )
                     try:
                         yield

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from pydantic import ValidationError
 
     from ars_web.datasets.options import ExportOptions
+    from ars_web.sessions.model import ObjectClass, SessionState
     from ars_web.sessions.object_mesh import SourcedMesh
     from ars_web.settings import Settings
 
@@ -46,6 +47,8 @@ Sessions = Annotated[
     Path, typer.Option("--sessions", metavar="DIR", envvar="ARS_WEB_SESSIONS", help="The sessions folder.")
 ]
 Session = Annotated[str, typer.Argument(metavar="SESSION", help="A session's id or its unique name.")]
+OneBox = Annotated[int | None, typer.Option("--box", metavar="ID", min=0, help="This object alone.")]
+OneClass = Annotated[str | None, typer.Option("--class", metavar="NAME", help="The objects of this class alone.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace the file where it exists.")]
 Name = Annotated[str | None, typer.Option("--name", metavar="NAME", help="The session's name; default: as it came.")]
@@ -325,3 +328,18 @@ def _refused(error: "ValidationError") -> typer.BadParameter:
     message = fault["msg"].removeprefix("Value error, ")
     given = "" if isinstance(fault["input"], dict) else f", not {fault['input']}"
     return typer.BadParameter(f"{message}{given}", param_hint=option)
+
+
+def class_named(state: "SessionState", name: str) -> "ObjectClass":
+    """The class of that name, or id.
+
+    Raises:
+        BadInput: there is none.
+    """
+    for one in state.classes.values():
+        if one.name == name:
+            return one
+    if name.isdecimal() and int(name) in state.classes:
+        return state.classes[int(name)]
+    known = ", ".join(f"{one.id} {one.name}" for one in state.classes.values()) or "none yet"
+    raise BadInput(f"there is no class {name!r} in this session; its classes are: {known}")

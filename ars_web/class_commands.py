@@ -13,7 +13,6 @@ from ars_web.terminal import note, print_json, print_table
 if TYPE_CHECKING:
     from ars_web.geometry.keypoints import Keypoint
     from ars_web.geometry.symmetry import Axis, Symmetry
-    from ars_web.sessions.model import ObjectClass, SessionState
 
 app = typer.Typer(help="A session's classes: size, symmetry, keypoints, mesh.", rich_markup_mode=None)
 
@@ -89,7 +88,7 @@ def set_class(
     points = UNSET if keypoint is None else [_keypoint(text) for text in keypoint]
     with SessionStore(sessions) as store:
         sid = store.find(session)
-        before = class_named(store.state(sid), name)
+        before = take.class_named(store.state(sid), name)
         after = SessionEditor(store).change_class(
             sid,
             before.id,
@@ -136,7 +135,7 @@ def class_mesh(
     mesh, notes = take.read_mesh(file, unit=unit, axes=axes, origin=origin, remove=remove)
     with SessionStore(sessions) as store:
         sid = store.find(session)
-        before = class_named(store.state(sid), name)
+        before = take.class_named(store.state(sid), name)
         after = SessionEditor(store).change_class(
             sid,
             before.id,
@@ -152,21 +151,6 @@ def class_mesh(
         print(f"{after.name}: {'no mesh' if mesh is None else mesh_text(mesh)}")
     for line in notes:
         note(f"ars-web: {line}")
-
-
-def class_named(state: "SessionState", name: str) -> "ObjectClass":
-    """The class of that name, or id.
-
-    Raises:
-        BadInput: there is none.
-    """
-    for one in state.classes.values():
-        if one.name == name:
-            return one
-    if name.isdecimal() and int(name) in state.classes:
-        return state.classes[int(name)]
-    known = ", ".join(f"{one.id} {one.name}" for one in state.classes.values()) or "none yet"
-    raise BadInput(f"there is no class {name!r} in this session; its classes are: {known}")
 
 
 def symmetry_from_text(text: str) -> "Symmetry":

@@ -26,9 +26,14 @@ def labels() -> None:
 def import_labels(
     session: take.Session,
     path: Annotated[
-        Path, typer.Argument(metavar="PATH", help="A BOP scene's folder, a COCO file, or a CVAT XML file.")
+        Path,
+        typer.Argument(
+            metavar="PATH", help="A BOP scene's folder, a COCO file, a CVAT XML file, or a VOC or YOLO folder."
+        ),
     ],
-    kind: Annotated[str, typer.Option("--format", metavar="FORMAT", help="auto, bop, coco or cvat.")] = "auto",
+    kind: Annotated[
+        str, typer.Option("--format", metavar="FORMAT", help="auto, bop, coco, cvat, voc or yolo.")
+    ] = "auto",
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would come in, and store nothing.")] = False,
     sessions: take.Sessions = take.SESSIONS,
     as_json: take.Json = False,

@@ -72,7 +72,7 @@ def test_a_dry_run_stores_nothing_and_json_says_the_same(
     [
         (("nowhere",), 1, "nowhere: is missing"),
         ((".",), 1, "holds no labels that are known"),
-        ((".", "--format", "kitti"), 2, "'kitti' is none of auto, bop, coco, cvat"),
+        ((".", "--format", "kitti"), 2, "'kitti' is none of auto, bop, coco, cvat, voc, yolo"),
     ],
 )
 def test_what_cannot_be_read_is_one_line(

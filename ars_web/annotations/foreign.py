@@ -130,6 +130,8 @@ class ForeignLabels:
         images: that it lists.
         models: kinds of posed objects.
         left_out: what the format holds and nothing here has a place for.
+        in_shares: whether outlines and rectangles are in shares of their image's width and height, not yet in image
+            coordinates, because the file does not know them; `sessions.label_matching` makes pixels of them.
     """
 
     format: str
@@ -140,6 +142,7 @@ class ForeignLabels:
     outlines: tuple[ForeignOutline, ...] = ()
     rectangles: tuple[ForeignRectangle, ...] = ()
     left_out: tuple[LeftOut, ...] = ()
+    in_shares: bool = False
 
 
 def joined(source: Path, parts: Sequence[ForeignLabels]) -> ForeignLabels:
@@ -172,4 +175,5 @@ def joined(source: Path, parts: Sequence[ForeignLabels]) -> ForeignLabels:
         tuple(outlines),
         tuple(rectangles),
         tuple(left_out),
+        parts[0].in_shares,
     )

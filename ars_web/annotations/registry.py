@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ars_web.annotations import bop, coco, cvat
+from ars_web.annotations import bop, coco, cvat, voc, yolo
 from ars_web.annotations.foreign import ForeignLabels, joined
 from ars_web.errors import BadFile, BadInput
 from ars_web.recordings.options import NOTHING_SAID, ReadOptions
@@ -41,6 +41,8 @@ READERS: dict[str, Reader] = {
     "bop": Reader("bop", bop.TITLE, bop.NEEDS, bop.find, bop.read, bop.are_parts),
     "coco": Reader("coco", coco.TITLE, coco.NEEDS, coco.find, coco.read, coco.are_parts),
     "cvat": Reader("cvat", cvat.TITLE, cvat.NEEDS, cvat.find, cvat.read, cvat.are_parts),
+    "voc": Reader("voc", voc.TITLE, voc.NEEDS, voc.find, voc.read, voc.are_parts),
+    "yolo": Reader("yolo", yolo.TITLE, yolo.NEEDS, yolo.find, yolo.read, yolo.are_parts),
 }
 
 

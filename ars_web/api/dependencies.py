@@ -28,6 +28,7 @@ from ars_web.sessions.import_jobs import ImportJobs
 from ars_web.sessions.import_looks import ImportLooks
 from ars_web.sessions.store import SessionStore
 from ars_web.sessions.uploads import Uploads
+from ars_web.studies.kept_views import KeptViews
 from ars_web.workspace import ScenePages, SceneViews
 
 
@@ -48,6 +49,7 @@ class Services:
         codes: one-time login codes.
         roots: folders that clients may import recordings from, links resolved, by name.
         largest_upload: bytes of an uploaded archive.
+        views: how frames see boxes, for coverage.
     """
 
     store: SessionStore
@@ -70,6 +72,7 @@ class Services:
     largest_upload: int
     pictures: Pictures
     telling: TellingViews
+    views: KeptViews
 
 
 def _services(connection: HTTPConnection) -> Services:

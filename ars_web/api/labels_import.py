@@ -36,7 +36,7 @@ _UPLOAD_BODY: dict[str, Any] = {
                     "file": {
                         "type": "string",
                         "format": "binary",
-                        "description": "a COCO or CVAT file, or a zip with one, or with a BOP scene and its models",
+                        "description": "a COCO or CVAT file, or a zip with labels of any format",
                     },
                     "format": {"type": "string", "enum": ["auto", *READERS], "default": "auto"},
                     "dry_run": {"type": "string", "enum": ["true", "false"], "default": "false"},

@@ -18,7 +18,7 @@ from ars_web.geometry.mask_regions import polygons_of, region
 from ars_web.geometry.polygon import Polygon
 from ars_web.geometry.resting_objects import resting_objects
 from ars_web.geometry.symmetry import NO_SYMMETRY, Symmetry
-from ars_web.sessions.label_matching import Matching, matched_images
+from ars_web.sessions.label_matching import Matching, in_pixels, matched_images
 from ars_web.sessions.model import FrameTable
 from ars_web.sessions.names import checked_name
 from ars_web.sessions.outlines import checked_polygons
@@ -76,6 +76,7 @@ def planned_labels(labels: ForeignLabels, frames: FrameTable, cameras: Mapping[i
         BadFile: its images are not the session's or have another size, or a class's name cannot be used.
     """
     matching = matched_images(labels, frames, cameras)
+    labels = in_pixels(labels, matching, frames, cameras)
     posed, unplaced = _posed(labels, matching, frames)
     seen, unseen = _seen(labels, matching, frames, cameras)
     return LabelPlan((*posed, *seen), (*labels.left_out, *unplaced, *unseen), matching.notes)

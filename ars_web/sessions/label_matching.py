@@ -3,12 +3,15 @@
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import PurePosixPath
+
+import numpy as np
 
 from ars_web.annotations.foreign import ForeignImage, ForeignLabels, LeftOut
 from ars_web.errors import BadFile
 from ars_web.geometry.camera import Camera
+from ars_web.geometry.polygon import Polygon
 from ars_web.sessions.model import FrameTable
 
 NO_FRAME = "it is in an image that is none of the session's frames"
@@ -20,6 +23,7 @@ SAME_CENTRE = 0.5
 SAME_FOCAL = 1e-3
 """Of a focal length."""
 
+_NOT_PLAIN = re.compile(r"[^A-Za-z0-9._-]")
 _DIGITS = re.compile(r"\d+")
 
 
@@ -45,7 +49,8 @@ class Matching:
 def matched_images(labels: ForeignLabels, frames: FrameTable, cameras: Mapping[int, Camera]) -> Matching:
     """Find the frames by the images' names, or by their numbers.
 
-    A name is that of a frame, or else its file name is, or else that without its ending, where only one frame has it.
+    A name is that of a frame, or else its file name is, or else that without its ending, or else what exports make of a
+    frame's name (`a/1.png` becomes `a_1`), where only one frame has it.
     A number is the digits in a frame's name, where every number has one frame; else it counts the frames from 0, where
     the file has as many images as the session has frames. Numbers of a video count the frames in the first place.
 
@@ -78,18 +83,54 @@ def matched_images(labels: ForeignLabels, frames: FrameTable, cameras: Mapping[i
     return Matching(certain, problems, tuple(notes))
 
 
+def in_pixels(
+    labels: ForeignLabels, matching: Matching, frames: FrameTable, cameras: Mapping[int, Camera]
+) -> ForeignLabels:
+    """The same labels with outlines and rectangles in image coordinates, by the cameras of the frames that images are.
+
+    Those in images that are no frames stay as they are.
+    """
+    if not labels.in_shares:
+        return labels
+    sizes = {place: cameras[int(frames.camera_ids[index])] for place, index in matching.frames.items()}
+
+    def scale(image: int) -> np.ndarray:
+        camera = sizes.get(image)
+        return np.ones(2) if camera is None else np.array([camera.width, camera.height], dtype=np.float64)
+
+    outlines = [
+        replace(
+            one,
+            polygons=tuple(
+                Polygon(p.outer * scale(one.image), tuple(hole * scale(one.image) for hole in p.holes))
+                for p in one.polygons
+            ),
+        )
+        for one in labels.outlines
+    ]
+    rectangles = [replace(one, bbox=one.bbox * np.tile(scale(one.image), 2)) for one in labels.rectangles]
+    return replace(labels, outlines=tuple(outlines), rectangles=tuple(rectangles), in_shares=False)
+
+
 def _by_name(named: Sequence[tuple[int, str]], names: Sequence[str]) -> dict[int, int]:
     whole = {name: index for index, name in enumerate(names)}
     files = _unique([PurePosixPath(name).name for name in names])
     stems = _unique([PurePosixPath(name).stem for name in names])
+    plain = _unique([_plain(PurePosixPath(name)) for name in names])
     found: dict[int, int] = {}
     for place, name in named:
         path = PurePosixPath(name.replace("\\", "/"))
-        for index in (whole.get(name), files.get(path.name), stems.get(path.stem)):
+        exported = plain.get(_plain(PurePosixPath(path.name)))
+        for index in (whole.get(name), files.get(path.name), stems.get(path.stem), exported):
             if index is not None:
                 found[place] = index
                 break
     return found
+
+
+def _plain(path: PurePosixPath) -> str:
+    """A name without its ending as `datasets.file_names` spells it."""
+    return _NOT_PLAIN.sub("_", str(path.with_suffix("") if path.name else path))
 
 
 def _unique(keys: Sequence[str]) -> dict[str, int]:

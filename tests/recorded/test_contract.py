@@ -17,7 +17,7 @@ def test_a_strangers_client_finds_the_contract_kept(served, tmp_path: Path) -> N
             body = {"name": "cell", "root": "data", "path": "cell", "classes": ["brick", "ball"]}
             made = client.post("/api/sessions", json=body)
             assert made.status_code == 201, made.text
-        script = [sys.executable, str(SHARED / "checks" / "contract.py"), base, TOKEN, made.json()["id"], "--masks"]
-        done = subprocess.run(script, capture_output=True, text=True, timeout=300)
+        script = [sys.executable, str(SHARED / "checks" / "contract.py"), base, TOKEN, made.json()["id"]]
+        done = subprocess.run([*script, "--masks", "--coverage"], capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "contract kept" in done.stdout

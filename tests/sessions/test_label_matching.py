@@ -5,10 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ars_web.annotations.foreign import ForeignImage, ForeignLabels
+from ars_web.annotations.foreign import ForeignImage, ForeignLabels, ForeignOutline, ForeignRectangle
 from ars_web.errors import BadFile
 from ars_web.geometry.camera import Camera
-from ars_web.sessions.label_matching import NO_FRAME, TWO_IMAGES, Matching, matched_images
+from ars_web.geometry.polygon import Polygon
+from ars_web.sessions.label_matching import NO_FRAME, TWO_IMAGES, Matching, in_pixels, matched_images
 from ars_web.sessions.model import FrameTable
 
 CAMERAS = {0: Camera(320, 240, 300.0, 300.0, 159.5, 119.5)}
@@ -43,6 +44,11 @@ def test_an_exact_name_goes_before_one_that_fits() -> None:
     found = match(["2.png", "3.png"], *named("old/2.png", "2.png", "images\\3.bmp"))
     assert found.frames == {1: 0, 2: 1}
     assert found.problems == {0: TWO_IMAGES}
+
+
+def test_a_name_may_be_the_one_of_an_export() -> None:
+    found = match(["left/1.png", "right/1.png", "caf\u00e9 2.jpg"], *named("left_1.png", "x/right_1.txt", "caf__2.jpg"))
+    assert found.frames == {0: 0, 1: 1, 2: 2}
 
 
 def test_a_name_that_comes_twice_is_no_frames() -> None:
@@ -85,3 +91,28 @@ def test_other_cameras_are_told() -> None:
     assert (
         "(image 1: fx, fy, cx, cy 310.0, 300.0, 159.5, 119.5 there, 300.0" in match(["0.png", "1.png"], other).notes[1]
     )
+
+
+def test_shares_become_pixels_of_each_frames_camera() -> None:
+    cameras = {0: Camera(320, 240, 300.0, 300.0, 159.5, 119.5), 1: Camera(100, 50, 80.0, 80.0, 49.5, 24.5)}
+    frames = FrameTable(
+        ("1.png", "2.png"), (Path("1.png"), Path("2.png")), np.array([0, 1]), np.tile(np.eye(4), (2, 1, 1))
+    )
+    ring, hole = np.array([[0, 0], [1, 0], [0, 1.0]]), np.array([[0.1, 0.1], [0.2, 0.1], [0.1, 0.2]])
+    labels = ForeignLabels(
+        "yolo",
+        Path("labels"),
+        (*(ForeignImage(name=f"{name}.txt") for name in ("2", "1", "3")),),
+        outlines=(ForeignOutline(0, "cup", None, (Polygon(ring, (hole,)),), "first"),),
+        rectangles=tuple(ForeignRectangle(i, "cup", None, np.array([0.1, 0.2, 0.5, 1.0]), "") for i in range(3)),
+        in_shares=True,
+    )
+    found = in_pixels(labels, matched_images(labels, frames, cameras), frames, cameras)
+    assert not found.in_shares
+    np.testing.assert_allclose([one.bbox for one in found.rectangles[:2]], [[10, 10, 50, 50], [32, 48, 160, 240]])
+    np.testing.assert_allclose(found.outlines[0].polygons[0].outer, [[0, 0], [100, 0], [0, 50]])
+    np.testing.assert_allclose(found.outlines[0].polygons[0].holes[0], [[10, 5], [20, 5], [10, 10]])
+    # The third is no frame, so nothing tells its size.
+    np.testing.assert_array_equal(found.rectangles[2].bbox, [0.1, 0.2, 0.5, 1.0])
+    pixels = ForeignLabels("voc", Path("labels"), labels.images, rectangles=labels.rectangles)
+    assert in_pixels(pixels, matched_images(labels, frames, cameras), frames, cameras) is pixels

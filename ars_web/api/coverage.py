@@ -1,0 +1,127 @@
+"""`/api/sessions/{sid}/coverage`: from where a session's objects are seen, and in which frames."""
+
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Query, Response
+from pydantic import BaseModel, Field
+
+from ars_web.api.dependencies import JsonResponse, ServicesDep, StrictRoute
+from ars_web.api.problems import documented
+from ars_web.datasets.coverage import SessionViews, called, chosen_boxes, coverage_of, frames_in_bin
+from ars_web.datasets.options import ExportOptions
+from ars_web.errors import BadInput
+from ars_web.geometry.sphere_bins import MOST_BINS, SphereBins
+from ars_web.sessions.model import SessionSnapshot
+from ars_web.studies.coverage_json import CoverageJson, coverage_json
+from ars_web.studies.coverage_picture import coverage_png
+
+router = APIRouter(prefix="/api/sessions/{sid}/coverage", tags=["coverage"], route_class=StrictRoute)
+
+BoxId = Annotated[int | None, Query(ge=0, lt=2**53, description="one object; default: all of them together")]
+ClassId = Annotated[int | None, Query(ge=0, lt=2**53, description="the objects of a class")]
+Bins = Annotated[int, Query(ge=1, le=MOST_BINS)]
+Shape = Annotated[
+    Literal["box", "hull", "mesh"] | None, Query(description="default: the hull where a box has one, else the box")
+]
+MinVisible = Annotated[
+    float,
+    Query(ge=0.0, le=1.0, allow_inf_nan=False, description="views in which less of an object is seen do not count"),
+]
+
+
+class ViewJson(BaseModel):
+    """A frame that sees an object from the bin."""
+
+    frame: int
+    box_id: int
+
+
+class BinFrames(BaseModel):
+    """The views of a bin, frame by frame."""
+
+    total: int
+    items: list[ViewJson] = Field(description="the first of them, `limit` at most, spread evenly over all")
+
+
+@router.get("", operation_id="coverage-read", response_model=CoverageJson, responses=documented(404))
+def read(
+    sid: str,
+    services: ServicesDep,
+    box_id: BoxId = None,
+    class_id: ClassId = None,
+    azimuth_bins: Bins = 36,
+    polar_bins: Bins = 18,
+    min_visible: MinVisible = 0.0,
+    shape: Shape = None,
+) -> Response:
+    """The paper's histogram of viewpoints, and one with cells of equal area.
+
+    A frame counts where an export with these options would label the object. Views that a class's symmetry makes look
+    alike count as one, in the bin that stands for them all.
+    """
+    bins = SphereBins(azimuth_bins, polar_bins)
+    _, views, rows = _views(services, sid, box_id, class_id, min_visible, shape)
+    return JsonResponse(coverage_json(coverage_of(views, bins, rows)).model_dump(mode="json"))
+
+
+@router.get(
+    "/picture",
+    operation_id="coverage-picture",
+    response_class=Response,
+    responses={200: {"description": "the histograms as PNG", "content": {"image/png": {}}}, **documented(404)},
+)
+def picture(
+    sid: str,
+    services: ServicesDep,
+    box_id: BoxId = None,
+    class_id: ClassId = None,
+    azimuth_bins: Bins = 36,
+    polar_bins: Bins = 18,
+    min_visible: MinVisible = 0.0,
+    shape: Shape = None,
+) -> Response:
+    """The same as a picture, for a paper or a notebook."""
+    bins = SphereBins(azimuth_bins, polar_bins)
+    snapshot, views, rows = _views(services, sid, box_id, class_id, min_visible, shape)
+    title = called(snapshot, box_id=box_id, class_id=class_id)
+    drawn = coverage_png(coverage_of(views, bins, rows), title=title)
+    return Response(drawn, media_type="image/png", headers={"Cache-Control": "private, no-cache"})
+
+
+@router.get("/frames", operation_id="coverage-frames-list", response_model=BinFrames, responses=documented(404))
+def frames(
+    sid: str,
+    services: ServicesDep,
+    box_id: BoxId = None,
+    class_id: ClassId = None,
+    azimuth_bins: Bins = 36,
+    polar_bins: Bins = 18,
+    min_visible: MinVisible = 0.0,
+    shape: Shape = None,
+    azimuth: Annotated[int | None, Query(ge=0, lt=MOST_BINS, description="a bin of equal angles, with `polar`")] = None,
+    polar: Annotated[int | None, Query(ge=0, lt=MOST_BINS)] = None,
+    cell: Annotated[int | None, Query(ge=0, lt=MOST_BINS**2, description="or a cell of equal area")] = None,
+    limit: Annotated[int, Query(ge=1, le=10_000)] = 200,
+) -> Response:
+    """The frames that see an object from one bin."""
+    bins = SphereBins(azimuth_bins, polar_bins)
+    if (azimuth is None) != (polar is None) or (cell is None) == (azimuth is None):
+        raise BadInput("give azimuth and polar of a bin of equal angles, or a cell of equal area")
+    if azimuth is not None and polar is not None and not (azimuth < bins.azimuth and polar < bins.polar):
+        raise BadInput(f"there is no bin {azimuth}, {polar} among {bins.azimuth} x {bins.polar}; they count from 0")
+    angle = None if azimuth is None or polar is None else azimuth * bins.polar + polar
+    _, views, rows = _views(services, sid, box_id, class_id, min_visible, shape)
+    found = frames_in_bin(views, bins, rows, angle=angle, cell=cell)
+    count = min(limit, len(found))
+    spread = [found[(2 * i + 1) * len(found) // (2 * count)] for i in range(count)]
+    items = [{"frame": frame, "box_id": views.box_ids[row]} for frame, row in spread]
+    return JsonResponse({"total": len(found), "items": items})
+
+
+def _views(
+    services: ServicesDep, sid: str, box_id: int | None, class_id: int | None, min_visible: float, shape: str | None
+) -> tuple[SessionSnapshot, SessionViews, list[int]]:
+    snapshot = services.store.snapshot(sid)
+    options = ExportOptions.model_validate({"min_visible": min_visible, "shape": shape})
+    rows = chosen_boxes(snapshot, box_id=box_id, class_id=class_id)
+    return snapshot, services.views.find(snapshot, options), rows

@@ -1,0 +1,55 @@
+"""YOLO predictions: a folder of text files, one an image, with rows `class cx cy w h confidence`, shares of the image.
+
+A file is of the image of its name; an image without a file has no predictions. Classes have numbers.
+"""
+
+from pathlib import Path
+
+from ars_web.errors import BadFile, BadInput
+from ars_web.evaluation.predictions_read import PredictionsRead
+from ars_web.evaluation.yolo_rows import rectangle, rows_of
+
+LISTS = ("classes.txt", "labels.txt", "names.txt", "notes.txt")
+"""Files that programs lay beside label files."""
+
+
+def is_one(path: Path) -> bool:
+    """Whether a folder holds text files."""
+    return path.is_dir() and bool(_files(path))
+
+
+def read(path: Path, into: PredictionsRead) -> None:
+    """Read them.
+
+    Raises:
+        BadFile: there is no such file, one is of no image, or a row cannot be; the message names file and line.
+    """
+    files = _files(path) if path.is_dir() else [path]
+    if not files:
+        raise BadFile(path, "holds no text file; YOLO predictions are one file an image, `class cx cy w h confidence`")
+    for file in files:
+        name = file.relative_to(path).with_suffix("").as_posix() if path.is_dir() else file.stem
+        try:
+            image = into.image_named(name)
+        except BadInput as error:
+            raise BadFile(file, str(error)) from error
+        size = into.truth.images[image].size if into.truth.in_pixels else (1, 1)
+        for line, number, numbers in rows_of(file):
+            if len(numbers) != 5:
+                said = f"has {len(numbers)} numbers after the class; a row is class cx cy w h confidence"
+                remedy = "; have the detector save confidences, too (save_conf)" if len(numbers) == 4 else ""
+                raise BadFile(file, said + remedy, line=line)
+            if size is None:
+                raise BadFile(
+                    file, "the truth has no size for this image, so shares of it are nowhere; say --image-size"
+                )
+            try:
+                into.add(image, into.class_numbered(number), rectangle(file, line, numbers[:4], size), numbers[4])
+            except BadFile:
+                raise
+            except BadInput as error:
+                raise BadFile(file, str(error), line=line) from error
+
+
+def _files(path: Path) -> list[Path]:
+    return [file for file in sorted(path.rglob("*.txt")) if file.name not in LISTS]
