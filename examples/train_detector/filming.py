@@ -12,6 +12,7 @@ from jaxtyping import Float
 from ars_web.demo import building, measuring, rendering, scene
 from ars_web.demo.scene import Thing
 from ars_web.demo.truth import TRUTH_FILE, DemoObject, DemoTruth, load_demo, truth_json
+from ars_web.demo.world import World
 from ars_web.geometry.mask_regions import polygons_from_mask
 from ars_web.geometry.polygon import Polygon
 
@@ -28,7 +29,8 @@ def film(
     *,
     size: tuple[int, int],
     noise: int,
-    progress: Callable[[int, int], None],
+    progress: Callable[[int, int], None] | None = None,
+    world: World | None = None,
 ) -> DemoTruth:
     """The recording in `folder`, made there unless it is there already, whole: its truth is written last.
 
@@ -36,6 +38,7 @@ def film(
         size: the images' width and height.
         noise: the sensor's noise is of frame number `noise` and those after it.
         progress: called with (images done, images in all).
+        world: the scene as arrays; None: as `lit_world` gives it, which takes half a minute.
     """
     if (folder / TRUTH_FILE).exists():
         return load_demo(folder)
@@ -45,18 +48,21 @@ def film(
     names = tuple(f"{i:05d}.jpg" for i in range(len(Ts_world_camera)))
     points = [measuring.surface_points_world(thing) for thing in things]
     with ThreadPoolExecutor(os.cpu_count()) as executor:
-        world = building.lit_world(things, desk=scene.desk(), executor=executor, meanwhile=rendering.compile_kernels)
+        lit = world or building.lit_world(
+            things, desk=scene.desk(), executor=executor, meanwhile=rendering.compile_kernels
+        )
 
         def photograph(i: int) -> tuple[int, measuring.Counts]:
-            sight = rendering.look(world.parts, rays, Ts_world_camera[i])
-            image = rendering.paint(world, rays, Ts_world_camera[i], sight, seed=noise + i)
+            sight = rendering.look(lit.parts, rays, Ts_world_camera[i])
+            image = rendering.paint(lit, rays, Ts_world_camera[i], sight, seed=noise + i)
             _, jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
             return (folder / "images" / names[i]).write_bytes(jpeg.tobytes()), measuring.pixel_counts(sight)
 
         taken: list[tuple[int, measuring.Counts]] = []
         for one in executor.map(photograph, range(len(names))):
             taken.append(one)
-            progress(len(taken), len(names))
+            if progress is not None:
+                progress(len(taken), len(names))
     counts = [count for _, count in taken]
     truth = DemoTruth(
         folder=folder,

@@ -66,19 +66,20 @@ def _size_of(file: Path) -> tuple[int, int]:
     return width, height
 
 
-def main() -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """The command line."""
     parser = argparse.ArgumentParser(description="Find objects in a split of a set exported as coco or yolo.")
     parser.add_argument("weights", type=Path, help="the file that train.py wrote")
     parser.add_argument("dataset", type=Path, help="the folder that ars-web export wrote")
     parser.add_argument("--split", default="val", help="which split to look at")
     parser.add_argument("--out", type=Path, required=True, help="the JSON file that is written")
-    asked = parser.parse_args()
+    asked = parser.parse_args(arguments)
     try:
         detector, class_names, size = load(asked.weights)
         dataset = read_dataset(asked.dataset, split=asked.split)
         if class_names != dataset.class_names:
-            raise BadInput(f"{asked.weights} finds {class_names}, and {asked.dataset} has {dataset.class_names}")
+            known, held = ", ".join(class_names), ", ".join(dataset.class_names)
+            raise BadInput(f"{asked.weights} finds {known}, and {asked.dataset} has {held}; train on such a set")
         results = predict(detector, dataset, size=size)
         write_results(results, asked.out)
     except ArsError as error:

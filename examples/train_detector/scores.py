@@ -1,19 +1,12 @@
-"""How good predictions are, by COCO's measure: every figure of the study comes from here."""
+"""How good predictions are, by COCO's measure, as `ars-web evaluate` has it: all of the study's figures."""
 
-import contextlib
-import io
-import json
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-from pycocotools.coco import COCO
-from pycocotools.cocoeval import COCOeval
-
-from examples.train_detector.predict import Result
-
-IOUS = np.round(np.linspace(0.5, 0.95, 10), 2)
+from ars_web.errors import BadInput
+from ars_web.evaluation.prediction_reading import read_predictions
+from ars_web.evaluation.scoring import evaluate
+from ars_web.evaluation.truth_reading import read_truth
 
 
 @dataclass(frozen=True)
@@ -33,38 +26,26 @@ class Scores:
     precision50: tuple[float, ...]
 
 
-def score(truth: Path, results: Sequence[Result]) -> Scores:
-    """The scores of predictions beside a COCO file of instances."""
-    # pycocotools prints what it does.
-    with contextlib.redirect_stdout(io.StringIO()):
-        known = COCO()
-        known.dataset = json.loads(truth.read_bytes())
-        known.createIndex()
-        found = COCO()
-        found.dataset = {**known.dataset, "annotations": _annotations(results)}
-        found.createIndex()
-        evaluation = COCOeval(known, found, "bbox")
-        evaluation.params.iouThrs = IOUS
-        evaluation.params.areaRng = [[0, 1e10]]
-        evaluation.params.areaRngLbl = ["all"]
-        evaluation.evaluate()
-        evaluation.accumulate()
-    precision = evaluation.eval["precision"][..., 0, -1]  # IoUs, recalls, classes
-    if not (precision > -1).all():
-        raise ValueError(f"{truth}: a class has no object that is to be found")
-    names = [known.cats[id_]["name"] for id_ in evaluation.params.catIds]
-    at_75 = int(np.flatnonzero(IOUS == 0.75)[0])
+def score(truth: Path, predictions: Path) -> Scores:
+    """The scores of COCO results beside a set that has every class.
+
+    Raises:
+        BadInput: a file cannot be used, or a class has no object that is to be found.
+    """
+    labels = read_truth(truth)
+    (scored,) = evaluate(labels, [read_predictions(predictions, labels)], coco=False).detectors
+    of_class = {one.name: _known(one.averages.at_50, truth, one.name) for one in scored.classes}
+    averages = scored.averages
     return Scores(
-        ap50=float(precision[0].mean()),
-        ap75=float(precision[at_75].mean()),
-        ap=float(precision.mean()),
-        ap50_of_class=dict(zip(names, precision[0].mean(axis=0).tolist(), strict=True)),
-        precision50=tuple(precision[0].mean(axis=1).tolist()),
+        ap50=_known(averages.at_50, truth, "any class"),
+        ap75=_known(averages.at_75, truth, "any class"),
+        ap=_known(averages.coco, truth, "any class"),
+        ap50_of_class=of_class,
+        precision50=tuple(scored.precision.tolist()),
     )
 
 
-def _annotations(results: Sequence[Result]) -> list[dict[str, object]]:
-    return [
-        {**one.model_dump(), "bbox": list(one.bbox), "id": i + 1, "iscrowd": 0, "area": one.bbox[2] * one.bbox[3]}
-        for i, one in enumerate(results)
-    ]
+def _known(value: float | None, truth: Path, what: str) -> float:
+    if value is None:
+        raise BadInput(f"{truth}: no image shows {what}, so that no precision of it is known; film more test images")
+    return value

@@ -103,7 +103,7 @@ def run(out: Path, configuration: Configuration, seed: int, study: Study) -> Run
         configuration=configuration,
         seed=seed,
         labels=sum(len(picture.classes) for picture in dataset.pictures),
-        scores=score(out / "test" / "annotations" / "instances_test.json", results),
+        scores=score(out / "test", folder / "predictions.json"),
         seconds=time.perf_counter() - begun,
         processor_seconds=time.process_time() - worked,
     )

@@ -8,7 +8,7 @@ The same set, options and number of threads give the same weights on the same ma
 import argparse
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -130,7 +130,7 @@ def _size(text: str) -> tuple[int, int]:
     return int(width), int(height)
 
 
-def main() -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """The command line."""
     usual = Options()
     parser = argparse.ArgumentParser(description="Train a small detector on a set exported as coco or yolo.")
@@ -141,7 +141,7 @@ def main() -> int:
     parser.add_argument("--iterations", type=int, default=usual.iterations, help="steps of the optimiser")
     parser.add_argument("--batch", type=int, default=usual.batch, help="images a step")
     parser.add_argument("--seed", type=int, default=usual.seed, help="another number trains another way")
-    asked = parser.parse_args()
+    asked = parser.parse_args(arguments)
     try:
         options = Options(size=asked.size, iterations=asked.iterations, batch=asked.batch, seed=asked.seed)
         dataset = read_dataset(asked.dataset, split=asked.split)

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from examples.train_detector.targets import STRIDE, decode, encode, overlaps
 from hypothesis import given
 from hypothesis import strategies as st
+
+from examples.train_detector.targets import STRIDE, decode, encode, overlaps
 
 SIZE = (64, 48)
 
