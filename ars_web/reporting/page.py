@@ -9,17 +9,18 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import ChoiceLoader, Environment, FileSystemLoader, PackageLoader, StrictUndefined
 
 from ars_web import __version__
 
 
-def report_page(template: str, **values: object) -> str:
+def report_page(template: str, /, *, templates: Path | None = None, **values: object) -> str:
     """What the template of that name under `templates/` makes of values; it extends `base.html`.
 
-    A value that the template wants and that is not there raises jinja2's UndefinedError: a template's mistake.
+    With `templates` it is looked for in that folder first. A value that the template wants and that is not there raises
+    jinja2's UndefinedError: a template's mistake.
     """
-    return _environment().get_template(template).render(version=__version__, **values)
+    return _environment(templates).get_template(template).render(version=__version__, **values)
 
 
 def write_page(page: str, file: Path) -> None:
@@ -46,9 +47,10 @@ def data_uri(content: bytes, *, media_type: str) -> str:
 
 
 @cache
-def _environment() -> Environment:
+def _environment(templates: Path | None) -> Environment:
+    own = PackageLoader("ars_web.reporting")
     return Environment(
-        loader=PackageLoader("ars_web.reporting"),
+        loader=own if templates is None else ChoiceLoader([FileSystemLoader(templates), own]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
