@@ -1,6 +1,6 @@
 /** All objects and classes, and how much of each no frame has seen; one of them is looked at. */
 
-import { html, useRef } from "../../lib/view.js";
+import { html, useLayoutEffect, useRef } from "../../lib/view.js";
 import * as store from "../../store.js";
 import { objects } from "./found.js";
 import { percent } from "./words.js";
@@ -42,6 +42,13 @@ export function Objects() {
   const list = useRef(/** @type {HTMLElement | null} */ (null));
   const all = rows();
   const at = Math.max(0, all.findIndex(({ isChosen }) => isChosen));
+  useLayoutEffect(() => {
+    const [element, row] = [list.current, list.current?.children[at]];
+    if (element === null || !(row instanceof HTMLElement)) return;
+    const above = row.getBoundingClientRect().top - element.getBoundingClientRect().top;
+    if (above < 0) element.scrollTop += above;
+    else element.scrollTop += Math.max(0, above + row.offsetHeight - element.clientHeight);
+  }, [at, all.length]);
   /** @param {KeyboardEvent} event */
   const keys = (event) => {
     const to = { ArrowDown: at + 1, ArrowRight: at + 1, ArrowUp: at - 1, ArrowLeft: at - 1, Home: 0, End: all.length - 1 }[event.key];
