@@ -286,6 +286,12 @@ export function coverageFrames(sid, of, counting, { by, index }, signal) {
   return request("GET", under(sid, `/coverage/frames?${query({ ...of, ...counted(counting), ...where })}`), { signal });
 }
 
+/**
+ * Where the report of a session is, a page of its own.
+ * @param {string} sid
+ */
+export const reportAddress = (sid) => under(sid, "/report");
+
 /** @param {string} sid @param {Seen} of @param {Counting} counting @param {"json" | "png"} as */
 export const coverageAddress = (sid, of, counting, as) =>
   under(sid, `/coverage${as === "png" ? "/picture" : ""}?${query({ ...of, ...counted(counting) })}`);

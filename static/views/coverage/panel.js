@@ -93,6 +93,8 @@ function HowCounted() {
         ([as, title]) => html`<a key=${as} class="button" href=${store.actions.coverageAddress(of, store.counting.value, as)} download=${`coverage.${as}`} title=${as === "png" ? "Both histograms as PNG" : "Both histograms as JSON"}>
           <${Icon} name="download" size=${14} />${title}</a>`,
       )}
+      <a class="button" href=${store.actions.reportAddress()} target="_blank" rel="noopener" title="What an export would hold and what to mend first, on a page of its own">
+        <${Icon} name="clipboard-list" size=${14} />Report</a>
     </div>`}
   </section>`;
 }
