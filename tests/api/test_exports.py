@@ -194,8 +194,16 @@ def test_a_preview_says_what_the_export_then_writes(client: httpx.Client, labell
         assert found[same] == report[same], same
     assert (found["frames"], found["images"]) == (3, {"linked": 0, "copied": 3, "encoded": 0})
     assert found["image_bytes"] == found["new_bytes"] > 0
+    assert found["directions"]["all"] > 0
+    assert found["choice"] is None
+    chosen = client.post(f"{path}/preview", json={"format": "coco", "options": {"frames": {"count": 2}}}).json()
+    assert (chosen["frames"], chosen["choice"]["asked"], chosen["choice"]["chosen"]) == (2, 2, 2)
+    assert chosen["choice"]["directions"] == chosen["directions"]["all"] >= chosen["choice"]["directions_evenly"]
     for bad in (
         {"format": "nope"},
+        {"format": "coco", "options": {"frames": {"count": 0}}},
+        {"format": "coco", "options": {"frames": {"sector": [5, 5]}}},
+        {"format": "coco", "options": {"split": {"by": "session", "hold_out": ["s9"]}}},
         {"format": "coco", "options": {"frames": {"start": 99}}},
         {"format": "coco", "x": 1},
     ):

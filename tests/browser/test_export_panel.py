@@ -351,3 +351,35 @@ def test_what_a_format_cannot_hold_is_said_before_and_after(boxed_session, open_
         expect(warning(page, "losses").locator(".problem")).to_have_text(losses)
         said = rows(page, "done").get_by_role("list", name="What it does not hold")
         expect(said.get_by_role("listitem")).to_have_text(losses)
+
+
+def test_frames_are_chosen_by_what_they_show_and_the_panel_says_what_they_cover(boxed_session, open_flatly) -> None:
+    with open_flatly(*boxed_session) as workspace:
+        page = workspace.page
+        open_panel(page)
+        even = page.get_by_role("radio", name="Even", exact=True)
+        expect(even).to_be_disabled()
+        field(page, "How many frames").fill("4")
+        expect(even).to_be_enabled()
+        counted(page)
+        made = page.get_by_role("region", name="How frames are chosen")
+        shown = {
+            row.get_attribute("data-frames"): int(row.locator(".count").inner_text())
+            for row in made.locator("dl > div").all()
+        }
+        assert shown["evenly"] <= shown["chosen"] <= shown["candidates"]
+
+        sector = page.get_by_role("textbox", name="Cameras from one side", exact=True)
+        sector.fill("10 to 10")
+        expect(problem_at(page, "frames.sector")).to_contain_text("Nothing lies between 10° and 10°")
+        sector.fill("0 to 180")
+        field(page, "Near twins by time").fill("1")
+        counted(page)
+        expect(made).to_contain_text("looked from another side")
+        chosen = int(forecast(page).locator('[data-count="frames"]').inner_text())
+        page.get_by_role("button", name=re.compile(rf"Export {chosen} frames?")).click()
+        expect(rows(page, "done")).to_be_visible(timeout=60_000)
+        (job,) = workspace.answer("/exports")
+        frames = job["options"]["frames"]
+        assert (frames["count"], frames["near_frames"], frames["sector"]) == (4, 1, [0, 180])
+        assert sum(split["images"] for split in job["report"]["splits"].values()) == chosen

@@ -15,7 +15,7 @@ import { many } from "./words.js";
 /** Options by what they are about: those of an object by its name, the others by theirs; what is new is about labels. */
 const CHOOSING = ["count", "by", "near_degrees", "near_frames", "sector", "sector_box"].map((name) => `frames.${name}`);
 const GROUPS = [
-  { title: "Choice among them", holder: "choosing", has: (/** @type {Option} */ { name }) => CHOOSING.includes(name) },
+  { title: "Which of these frames", holder: "choosing", has: (/** @type {Option} */ { name }) => CHOOSING.includes(name) },
   { title: "Frames", holder: "frames", has: (/** @type {Option} */ { name }) => name.startsWith("frames.") || name === "sessions" },
   { title: "Images", holder: "images", has: (/** @type {Option} */ { name }) => name === "images" },
   { title: "Split", holder: "split", has: (/** @type {Option} */ { name }) => name.startsWith("split.") },

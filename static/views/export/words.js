@@ -52,7 +52,7 @@ export function runs(numbers) {
  * @param {(sid: string) => string} [nameOf] of a session
  */
 export function valueWords(option, value, nameOf = (sid) => sid) {
-  if (value === null || value === undefined) return "none";
+  if (value === null || value === undefined) return option.name === "frames.count" ? "all" : "none";
   if (option.type === "choice") return capital(String(value));
   if (option.type === "integers") return shortened(runs(/** @type {number[]} */ (value)));
   if (option.type === "range") return `${angles(/** @type {number[]} */ (value))} °`;
