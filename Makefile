@@ -15,15 +15,14 @@ PINNED := pyproject.toml setup.py constraints.txt .ci/environment
 demo: .venv/runtime.stamp
 	$(BIN)/ars-web demo
 
-# All of them in two steps: what needs no browser in two processes, each file in one of them; then what drives a
-# browser in one, because a second Chromium beside the first would only slow both. `make test ARGS="tests/api -q"` runs
-# some.
+# How the tests are spread when all are run; tests/conftest.py says which go together and in which order.
+SPREAD := -n 2 --dist loadfile --no-loadscope-reorder
+
+# `make test ARGS="tests/api -q"` runs some, in one process. Bytecode is kept whatever the environment says: the tests
+# start hundreds of processes, each of which would compile the whole package first.
+test: export PYTHONDONTWRITEBYTECODE =
 test: .venv/dev.stamp
-	ARS_WEB_CHROMIUM="$$(.ci/chromium)" && export ARS_WEB_CHROMIUM && if [ -n "$(ARGS)" ]; then \
-	    $(BIN)/python -m pytest $(ARGS); \
-	else \
-	    $(BIN)/python -m pytest -n 2 --dist loadfile --ignore tests/browser && $(BIN)/python -m pytest tests/browser; \
-	fi
+	ARS_WEB_CHROMIUM="$$(.ci/chromium)" && export ARS_WEB_CHROMIUM && $(BIN)/python -m pytest $(or $(ARGS),$(SPREAD))
 
 check: .venv/dev.stamp
 	$(BIN)/ruff format --check .

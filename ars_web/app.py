@@ -44,10 +44,12 @@ from ars_web.api import (
     polygons,
     problems,
     refine,
+    report,
     scene_door,
     segment,
     sessions,
     telling_frames,
+    tour,
 )
 from ars_web.api.body_limit import BodyLimit
 from ars_web.api.credentials import CODE_LIFETIME, Cookies, LoginCodes, install_token
@@ -117,6 +119,7 @@ def create_app(settings: Settings) -> FastAPI:
         sessions,
         classes,
         coverage,
+        tour,
         frames,
         marks,
         labels_preview,
@@ -137,6 +140,7 @@ def create_app(settings: Settings) -> FastAPI:
         scene_door,
         exports,
         formats,
+        report,
     ):
         app.include_router(module.router)
     app.include_router(login.router(static))
@@ -163,10 +167,12 @@ def _lifespan(settings: Settings, segmenter: Segmenter) -> Callable[[FastAPI], A
             import_jobs = ImportJobs(store, uploads)
             editor = SessionEditor(store)
             outlines = OutlineJobs(store, editor)
+            kept_views = KeptViews()
             try:
                 uploads.sweep()
                 jobs.resume_unfinished()
-                async with EventHub(store).running() as hub, _closing(SceneServers(store, editor)) as scenes:
+                scene_servers = SceneServers(store, editor, kept_views=kept_views)
+                async with EventHub(store).running() as hub, _closing(scene_servers) as scenes:
                     unlisten = editor.listen(hub.wake)
                     app.state.services = Services(
                         store=store,
@@ -195,7 +201,7 @@ def _lifespan(settings: Settings, segmenter: Segmenter) -> Callable[[FastAPI], A
                         largest_upload=settings.largest_upload,
                         pictures=Pictures(),
                         telling=TellingViews(store),
-                        views=KeptViews(),
+                        views=kept_views,
                     )
                     try:
                         yield

@@ -139,7 +139,7 @@ Copy = Annotated[bool, typer.Option("--copy", help="Copy the images into the ses
 # export
 DatasetFormat = Annotated[str, typer.Option("--format", metavar="FORMAT", help="One that `ars-web formats` lists.")]
 DatasetFolder = Annotated[
-    str,
+    str | None,
     typer.Option("--out", metavar="DIR", help="The dataset's folder, new or empty; s3://BUCKET/DIR for a store."),
 ]
 FramesStep = Annotated[int | None, typer.Option("--frames-step", metavar="N", help="Every N-th frame; default 1.")]
@@ -148,6 +148,27 @@ FramesStop = Annotated[
     int | None, typer.Option("--frames-stop", metavar="N", help="Up to this index, without it; default: the end.")
 ]
 FramesList = Annotated[str | None, typer.Option("--frames-list", metavar="1,2,3", help="These indices alone.")]
+FramesCount = Annotated[int | None, typer.Option("--frames-count", metavar="N", help="So many in all; default: all.")]
+FramesBy = Annotated[
+    Literal["coverage", "even"] | None,
+    typer.Option("--frames-by", help="Choose those that cover most directions (default), or evenly spaced ones."),
+]
+FramesNearDegrees = Annotated[
+    float | None,
+    typer.Option("--frames-near-degrees", metavar="DEG", help="Leave out near twins of chosen views; default 0: none."),
+]
+FramesNearFrames = Annotated[
+    int | None,
+    typer.Option("--frames-near-frames", metavar="N", help="Leave out the N frames beside chosen ones; default 0."),
+]
+FramesSector = Annotated[
+    str | None,
+    typer.Option("--frames-sector", metavar="FROM:TO", help="Cameras between these angles round the objects, degrees."),
+]
+FramesSectorBox = Annotated[
+    int | None,
+    typer.Option("--frames-sector-box", metavar="ID", help="Angles round this box; default: the middle of all."),
+]
 Images = Annotated[
     Literal["link", "copy", "rectify", "none"] | None,
     typer.Option("--images", help="Hard links (default), copies, undistorted copies, or no images."),
@@ -177,10 +198,18 @@ SplitTrain = Annotated[float | None, typer.Option("--split-train", metavar="SHAR
 SplitVal = Annotated[float | None, typer.Option("--split-val", metavar="SHARE", help="Default 0.2.")]
 SplitTest = Annotated[float | None, typer.Option("--split-test", metavar="SHARE", help="Default 0.")]
 SplitBy = Annotated[
-    Literal["block", "frame", "session"] | None,
-    typer.Option("--split-by", help="Divide runs of frames (default), single frames, or whole sessions."),
+    Literal["block", "frame", "session", "sector"] | None,
+    typer.Option("--split-by", help="Divide runs of frames (default), frames, whole sessions, or sides looked from."),
+]
+SplitHoldOut = Annotated[
+    str | None,
+    typer.Option("--split-hold-out", metavar="SESSION,SESSION", help="Sessions for val or test; others train."),
 ]
 SplitSeed = Annotated[int | None, typer.Option("--split-seed", metavar="N", help="Default 0.")]
+DryRun = Annotated[
+    bool,
+    typer.Option("--dry-run", help="Write nothing: print what would be written, and which directions it covers."),
+]
 Check = Annotated[
     bool,
     typer.Option("--check", help="Read the set back, and compare each label with the session's; 1 if any differs."),
@@ -236,6 +265,23 @@ def whole_numbers(text: str | None, option: str) -> list[int]:
         return [int(item) for item in comma_separated(text, option)]
     except ValueError as error:
         raise typer.BadParameter(f"{text!r} must be whole numbers with commas between", param_hint=option) from error
+
+
+def number_range(text: str | None, option: str, *, example: str = "0.3:0.8") -> tuple[float, float] | None:
+    """The two numbers of `FROM:TO`; None where it is None.
+
+    Raises:
+        typer.BadParameter: it is no such pair; `example` is one that is.
+    """
+    if text is None:
+        return None
+    low, colon, high = text.partition(":")
+    try:
+        if colon:
+            return float(low), float(high)
+    except ValueError:
+        pass
+    raise typer.BadParameter(f"{text!r} must be two numbers with a colon between, such as {example}", param_hint=option)
 
 
 def session_name(recording: Path) -> str:
@@ -324,7 +370,7 @@ def _refused(error: "ValidationError") -> typer.BadParameter:
     if names == ["split"]:
         option = "--split-train, --split-val, --split-test"
     elif names == ["frames"]:
-        option = "--frames-list"
+        option = "--frames-..."
     message = fault["msg"].removeprefix("Value error, ")
     given = "" if isinstance(fault["input"], dict) else f", not {fault['input']}"
     return typer.BadParameter(f"{message}{given}", param_hint=option)

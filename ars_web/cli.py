@@ -7,7 +7,7 @@ there at once.
 import os
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from io import TextIOWrapper
 from pathlib import Path
@@ -21,7 +21,11 @@ from ars_web.errors import ArsError
 from ars_web.terminal import has_screen, note, open_browser, print_json, print_table, progress
 
 if TYPE_CHECKING:
+    from ars_web.datasets.planned import ExportPlan
     from ars_web.recordings.recording import SkippedFrame
+
+DRY_RUN_FOLDER = ".ars-web-dry-run"
+"""Where a dataset would be that nobody named a folder for; it is never made."""
 
 INTERRUPTED = 130
 """Exit status after Ctrl-C, as shells count it: 128 + SIGINT."""
@@ -201,11 +205,17 @@ def list_sessions(sessions: take.Sessions = take.SESSIONS, as_json: take.Json = 
 def export(
     session: take.Session,
     kind: take.DatasetFormat,
-    out: take.DatasetFolder,
+    out: take.DatasetFolder = None,
     frames_step: take.FramesStep = None,
     frames_start: take.FramesStart = None,
     frames_stop: take.FramesStop = None,
     frames_list: take.FramesList = None,
+    frames_count: take.FramesCount = None,
+    frames_by: take.FramesBy = None,
+    frames_near_degrees: take.FramesNearDegrees = None,
+    frames_near_frames: take.FramesNearFrames = None,
+    frames_sector: take.FramesSector = None,
+    frames_sector_box: take.FramesSectorBox = None,
     images: take.Images = None,
     shape: take.Shape = None,
     masks: take.Masks = None,
@@ -217,6 +227,7 @@ def export(
     split_val: take.SplitVal = None,
     split_test: take.SplitTest = None,
     split_by: take.SplitBy = None,
+    split_hold_out: take.SplitHoldOut = None,
     split_seed: take.SplitSeed = None,
     merge: take.Merge = None,
     executor: take.Executor = "local",
@@ -225,6 +236,7 @@ def export(
     tls_key: take.TlsKey = None,
     workers: take.Workers = None,
     check: take.Check = False,
+    dry_run: take.DryRun = False,
     sessions: take.Sessions = take.SESSIONS,
     as_json: take.Json = False,
 ) -> None:
@@ -240,7 +252,11 @@ def export(
     if kind not in WRITERS:
         raise typer.BadParameter(f"{kind!r} is none of {', '.join(WRITERS)}", param_hint="--format")
     take.refuse_foreign_options(kind, {"masks": masks, "heading_bins": heading_bins})
-    target = place(out)
+    if out is None and not dry_run:
+        raise typer.BadParameter("name the folder for the dataset, or ask for a --dry-run", param_hint="--out")
+    if check and dry_run:
+        raise typer.BadParameter("there is nothing to read back of a --dry-run", param_hint="--check")
+    target = place(DRY_RUN_FOLDER if out is None else out)
     if check and not isinstance(target, Path):
         raise typer.BadParameter(
             f"a set on a store is not read back; export it to a folder, not to {target}", param_hint="--check"
@@ -253,6 +269,12 @@ def export(
             "frames.start": frames_start,
             "frames.stop": frames_stop,
             "frames.list": take.whole_numbers(frames_list, "--frames-list") or None,
+            "frames.count": frames_count,
+            "frames.by": frames_by,
+            "frames.near_degrees": frames_near_degrees,
+            "frames.near_frames": frames_near_frames,
+            "frames.sector": take.number_range(frames_sector, "--frames-sector", example="0:180"),
+            "frames.sector_box": frames_sector_box,
             "images": images,
             "shape": shape,
             "masks": masks,
@@ -264,11 +286,20 @@ def export(
             "split.val": split_val,
             "split.test": split_test,
             "split.by": split_by,
+            "split.hold_out": [store.find(name) for name in take.comma_separated(split_hold_out, "--split-hold-out")],
             "split.seed": split_seed,
             "sessions": ids[1:],
         }
         options = take.export_options(given)
         snapshots = [store.snapshot(sid) for sid in ids]
+    if dry_run:
+        planned = (
+            plan_export(snapshots, format=kind, options=options, out=target)
+            if isinstance(target, Path)
+            else plan_stored_export(snapshots, format=kind, options=options)
+        )
+        _print_forecast(planned, as_json=as_json)
+        return
     try:
         if isinstance(target, Path):
             plan = plan_export(snapshots, format=kind, options=options, out=target)
@@ -294,15 +325,38 @@ def export(
     else:
         rows = [(name, s.images, s.negatives, s.labels) for name, s in report.splits.items()]
         print_table(("split", "images", "without a label", "labels"), rows)
-        dropped = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in report.dropped.items() if count)
-        print(f"dropped: {dropped or 'none'}")
-        for loss in report.losses:
-            print(f"lost: {loss}")
+        _print_lost(report.dropped, report.losses)
         if checked is not None:
             print(*checked.lines(), sep="\n")
         print(target)
     if checked is not None and not checked.agrees:
         raise typer.Exit(1)
+
+
+def _print_forecast(plan: "ExportPlan", *, as_json: bool) -> None:
+    """What an export would write, and which frames it takes of which session."""
+    from ars_web.datasets.forecast import forecast
+
+    found = forecast(plan)
+    if as_json:
+        chosen = {
+            session.id: plan.frames.index[plan.frames.session == number].tolist()
+            for number, session in enumerate(plan.sessions)
+        }
+        print_json({"forecast": found.model_dump(mode="json"), "frames": chosen})
+        return
+    seen = found.directions.splits
+    rows = [(name, s.images, s.negatives, s.labels, seen[name]) for name, s in found.splits.items()]
+    print_table(("split", "images", "without a label", "labels", "directions"), rows)
+    print(*found.lines(), sep="\n")
+    _print_lost(found.dropped, found.losses)
+
+
+def _print_lost(dropped: Mapping[str, int], losses: Sequence[str]) -> None:
+    reasons = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in dropped.items() if count)
+    print(f"dropped: {reasons or 'none'}")
+    for loss in losses:
+        print(f"lost: {loss}")
 
 
 @app.command()

@@ -83,5 +83,213 @@ def coverage(
         print(out)
 
 
+@app.command()
+def tour(
+    session: take.Session,
+    box: take.OneBox = None,
+    class_name: take.OneClass = None,
+    count: Annotated[int, typer.Option("--count", metavar="N", min=1, max=2000, help="Views at most.")] = 20,
+    distance: Annotated[
+        str | None,
+        typer.Option("--distance", metavar="MIN:MAX", help="Metres to the object; default: as the frames have it."),
+    ] = None,
+    height: Annotated[
+        str | None,
+        typer.Option("--height", metavar="MIN:MAX", help="The camera's z, metres; default: as the frames have it."),
+    ] = None,
+    tilt: Annotated[
+        str | None,
+        typer.Option("--tilt", metavar="MIN:MAX", help="Degrees below the horizontal; default: as the frames have it."),
+    ] = None,
+    min_visible: Annotated[
+        float | None,
+        typer.Option(
+            "--min-visible",
+            metavar="SHARE",
+            help="How much of an object is seen, in frames that count and in views; default: any, and half.",
+        ),
+    ] = None,
+    azimuth_bins: Annotated[
+        int, typer.Option("--azimuth-bins", metavar="N", min=1, max=360, help="Bins round the box's z axis.")
+    ] = 36,
+    polar_bins: Annotated[
+        int, typer.Option("--polar-bins", metavar="N", min=1, max=360, help="Bins from +z down to -z.")
+    ] = 18,
+    shape: take.Shape = None,
+    start_frame: Annotated[
+        int | None, typer.Option("--start-frame", metavar="N", min=0, help="Begin at this frame; default: the last.")
+    ] = None,
+    hand_eye: Annotated[
+        Path | None,
+        typer.Option(
+            "--hand-eye",
+            metavar="FILE",
+            help="x y z qx qy qz qw of the camera in the wrist; default: the recording's own.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FILE", help="Write all (.json), or poses of the wrist as robot_poses (.txt)."),
+    ] = None,
+    sessions: take.Sessions = take.SESSIONS,
+    as_json: take.Json = False,
+) -> None:
+    """Where to look next: camera poses that fill what no frame has seen of the objects, as a short tour.
+
+    Each view shows its object whole, large enough and not behind others, and keeps to the limits and 5 cm from every
+    box. What stands between two views is not looked at: getting there is the robot's to plan.
+    """
+    import math
+
+    from ars_web.datasets.coverage import chosen_boxes, session_views
+    from ars_web.errors import BadInput
+    from ars_web.geometry.sphere_bins import SphereBins
+    from ars_web.recordings.ars import camera_in_wrist
+    from ars_web.sessions.store import SessionStore
+    from ars_web.studies.tour import TourRequest, plan_tour, recorded_wrist
+    from ars_web.studies.tour_json import tour_json, wrist_rows
+
+    if out is not None and out.suffix.lower() not in (".json", ".txt"):
+        raise typer.BadParameter(f"{out} ends neither in .json nor in .txt", param_hint="--out")
+    if box is not None and class_name is not None:
+        raise typer.BadParameter("give --box or --class, not both: a box is of one class", param_hint="--class")
+    degrees = take.number_range(tilt, "--tilt")
+    request = TourRequest(
+        bins=SphereBins(azimuth_bins, polar_bins),
+        count=count,
+        distance=take.number_range(distance, "--distance"),
+        height=take.number_range(height, "--height"),
+        tilt=None if degrees is None else (math.radians(degrees[0]), math.radians(degrees[1])),
+        min_visible=min_visible,
+        shape=shape,
+        start_frame=start_frame,
+    )
+    with SessionStore(sessions) as store:
+        summary = store.summary(store.find(session))
+        snapshot = store.snapshot(summary.id)
+    class_id = None if class_name is None else take.class_named(snapshot.state, class_name).id
+    chosen = chosen_boxes(snapshot, box_id=box, class_id=class_id)
+    if hand_eye is None:
+        wrist = recorded_wrist(summary.format, Path(summary.source))
+        T_wrist_camera, unknown = wrist.T_wrist_camera, wrist.unknown
+    else:
+        T_wrist_camera, unknown = camera_in_wrist(hand_eye), None
+    wants_wrist = out is not None and out.suffix.lower() == ".txt"
+    if wants_wrist and T_wrist_camera is None:
+        raise BadInput(f"{out} is to hold poses of the wrist, but {unknown}; give --hand-eye FILE, or write a .json")
+    found = plan_tour(snapshot, session_views(snapshot, request.options), chosen, request)
+    told = tour_json(found, T_wrist_camera=T_wrist_camera)
+    if out is not None and T_wrist_camera is not None and wants_wrist:
+        out.write_text(wrist_rows(found, T_wrist_camera))
+    elif out is not None:
+        write_json(out, told.model_dump(mode="json"))
+    if as_json:
+        print_json(told.model_dump(mode="json"))
+        return
+    rows = [
+        (
+            place,
+            snapshot.state.boxes[stop.box_id].name,
+            " ".join(f"{value:.3f}" for value in stop.T_world_camera[:3, 3]),
+            f"{stop.distance:.3f}",
+            f"{math.degrees(stop.tilt):.1f}",
+            len(stop.labelled),
+            len(stop.fills),
+        )
+        for place, stop in enumerate(found.stops, start=1)
+    ]
+    print_table(("view", "looks at", "camera at x y z", "distance", "tilt", "labels", "fills cells"), rows)
+    for line in found.lines():
+        print(line)
+    if out is not None:
+        print(out)
+
+
 def _percent(share: float) -> str:
     return f"{100 * share:.1f} %"
+
+
+@app.command()
+def report(
+    session: take.Session,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", metavar="FILE.html", help="The page; default: the session's name and -report.html, here."
+        ),
+    ] = None,
+    frames_step: take.FramesStep = None,
+    frames_start: take.FramesStart = None,
+    frames_stop: take.FramesStop = None,
+    frames_list: take.FramesList = None,
+    frames_count: take.FramesCount = None,
+    frames_by: take.FramesBy = None,
+    frames_near_degrees: take.FramesNearDegrees = None,
+    frames_near_frames: take.FramesNearFrames = None,
+    frames_sector: take.FramesSector = None,
+    frames_sector_box: take.FramesSectorBox = None,
+    images: take.Images = None,
+    shape: take.Shape = None,
+    min_visible: take.MinVisible = None,
+    max_truncated: take.MaxTruncated = None,
+    min_area_px: take.MinArea = None,
+    split_train: take.SplitTrain = None,
+    split_val: take.SplitVal = None,
+    split_test: take.SplitTest = None,
+    split_by: take.SplitBy = None,
+    split_seed: take.SplitSeed = None,
+    sessions: take.Sessions = take.SESSIONS,
+    as_json: take.Json = False,
+) -> None:
+    """What an export would hold, and what to mend before training: one page, with pictures, that needs nothing else.
+
+    Options decide labels and splits as those of `export` do. With --json the facts are printed instead, and a page is
+    written only where --out says so.
+    """
+    from ars_web.datasets.file_names import safe
+    from ars_web.reporting.page import write_page
+    from ars_web.sessions.store import SessionStore
+    from ars_web.studies.report_page import session_page
+    from ars_web.studies.session_report import session_report
+    from ars_web.studies.session_study import study_session
+
+    if out is not None and out.suffix.lower() not in (".html", ".htm"):
+        raise typer.BadParameter(f"{out} does not end in .html", param_hint="--out")
+    given = {
+        "frames.step": frames_step,
+        "frames.start": frames_start,
+        "frames.stop": frames_stop,
+        "frames.list": take.whole_numbers(frames_list, "--frames-list") or None,
+        "frames.count": frames_count,
+        "frames.by": frames_by,
+        "frames.near_degrees": frames_near_degrees,
+        "frames.near_frames": frames_near_frames,
+        "frames.sector": take.number_range(frames_sector, "--frames-sector", example="0:180"),
+        "frames.sector_box": frames_sector_box,
+        "images": images,
+        "shape": shape,
+        "min_visible": min_visible,
+        "max_truncated": max_truncated,
+        "min_area_px": min_area_px,
+        "split.train": split_train,
+        "split.val": split_val,
+        "split.test": split_test,
+        "split.by": split_by,
+        "split.seed": split_seed,
+    }
+    options = take.export_options(given)
+    with SessionStore(sessions) as store:
+        sid = store.find(session)
+        snapshot, recorded = store.snapshot(sid), store.summary(sid)
+    study = study_session(snapshot, options)
+    facts = session_report(study, recorded)
+    if as_json:
+        print_json(facts.model_dump(mode="json"))
+    if out is None and not as_json:
+        out = Path(f"{safe(snapshot.state.name)}-report.html")
+    if out is not None:
+        write_page(session_page(study, facts), out)
+    if not as_json:
+        for warning in facts.warnings:
+            print(f"{'grave' if warning.grave else 'warning'}: {warning.says}")
+        print(out)

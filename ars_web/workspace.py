@@ -15,6 +15,36 @@ Tool = Literal["select", "move", "rotate", "resize"]
 
 
 @dataclass(frozen=True)
+class CoverageSight:
+    """A sphere round a box: how many views there are of it, or of all of its class, from each direction.
+
+    Attributes:
+        box_id: what the sphere stands round.
+        whole_class: whether views of all objects of the box's class count, in their own boxes' frames.
+        azimuth_bins, polar_bins: as many cells of equal area are drawn.
+        min_visible: views in which less of an object is seen do not count.
+        chosen_bin: a bin of equal angles that is outlined: azimuth bin * polar bins + polar bin.
+        chosen_cell: or a cell of equal area.
+    """
+
+    box_id: int
+    whole_class: bool = False
+    azimuth_bins: int = 18
+    polar_bins: int = 9
+    min_visible: float = 0.0
+    chosen_bin: int | None = None
+    chosen_cell: int | None = None
+
+
+@dataclass(frozen=True)
+class ProposedCamera:
+    """Where a camera could stand next, in the world: position in metres, and how it is turned."""
+
+    position: tuple[float, float, float]
+    wxyz: tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
 class ViewState:
     """What a page wants its scene to show.
 
@@ -29,6 +59,8 @@ class ViewState:
         upright: boxes turn about the world's z axis only.
         hidden: boxes that this page does not show.
         dark: the page's theme.
+        coverage: the sphere that is shown; None: none.
+        tour: cameras proposed next, in their order.
     """
 
     mode: Literal["scene", "frame"] = "scene"
@@ -41,6 +73,8 @@ class ViewState:
     upright: bool = False
     hidden: frozenset[int] = frozenset()
     dark: bool = True
+    coverage: CoverageSight | None = None
+    tour: tuple[ProposedCamera, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +108,15 @@ class Picked:
 
     box_id: int | None = None
     frame: int | None = None
+
+
+@dataclass(frozen=True)
+class DirectionPicked:
+    """The coverage's sphere was clicked: in which bin of equal angles (azimuth bin * polar bins + polar bin), and in
+    which cell of equal area, after folding by the object's symmetry."""
+
+    bin: int
+    cell: int
 
 
 @dataclass(frozen=True)
@@ -120,7 +163,7 @@ class Refused:
     detail: str
 
 
-ViewEvent = Picked | Entered | Dragged | Conflicted | Refused
+ViewEvent = Picked | DirectionPicked | Entered | Dragged | Conflicted | Refused
 
 
 class SceneViews(Protocol):

@@ -1,6 +1,7 @@
-"""Makes the README's pictures, docs/workspace.png and docs/export.jpg, in a real browser: python docs/workspace.py
+"""Makes the README's pictures in a real browser: python docs/workspace.py
 
-Needs what `make test` needs. They are of the demo's session, with nothing drawn in afterwards.
+They are docs/workspace.png, docs/coverage.jpg and docs/export.jpg, of the demo's session, with nothing drawn in
+afterwards. Needs what `make test` needs.
 """
 
 import os
@@ -14,6 +15,7 @@ from pathlib import Path
 from playwright.sync_api import sync_playwright
 
 PICTURE = Path(__file__).with_name("workspace.png")
+COVERAGE = Path(__file__).with_name("coverage.jpg")
 EXPORT = Path(__file__).with_name("export.jpg")
 SIZE = {"width": 1440, "height": 900}
 FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
@@ -31,6 +33,7 @@ def main() -> None:
                 browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
                 page = browser.new_page(viewport=SIZE, color_scheme="dark")
                 take(page, login)
+                take_coverage(page)
                 take_export(page)
                 browser.close()
         finally:
@@ -52,6 +55,20 @@ def take(page, login: str) -> None:
     )
     page.wait_for_timeout(4000)  # thumbnails and the photo, drawn in software
     page.screenshot(path=PICTURE)
+
+
+def take_coverage(page) -> None:
+    """Look at where the mug is seen from, at the frames of one direction, and at the views planned next."""
+    page.get_by_role("tab", name="Coverage").click()
+    page.get_by_role("grid", name="Views of mug by direction").wait_for(timeout=120_000)
+    page.get_by_label("Views at most").fill("6")
+    page.get_by_role("button", name="Plan views").click()
+    page.locator(".tour-views li").first.wait_for(timeout=120_000)
+    page.get_by_role("button", name="Look closer").click()
+    page.locator('.bin:not([data-count="0"])').nth(8).click()
+    page.locator(".bin-frames [data-frame]").first.wait_for(timeout=120_000)
+    page.wait_for_timeout(6000)  # the sphere and the pictures, drawn in software
+    page.screenshot(path=COVERAGE, type="jpeg", quality=80)
 
 
 def take_export(page) -> None:

@@ -355,6 +355,109 @@ export interface paths {
         patch: operations["classes-change"];
         trace?: never;
     };
+    "/api/sessions/{sid}/coverage": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Read
+         * @description The paper's histogram of viewpoints, and one with cells of equal area.
+         *
+         *     A frame counts where an export with these options would label the object. Views that a class's symmetry makes look
+         *     alike count as one, in the bin that stands for them all.
+         */
+        get: operations["coverage-read"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/coverage/picture": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Picture
+         * @description The same as a picture, for a paper or a notebook.
+         */
+        get: operations["coverage-picture"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/coverage/frames": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Frames
+         * @description The frames that see an object from one bin.
+         */
+        get: operations["coverage-frames-list"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/coverage/objects": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Objects
+         * @description How much is seen of each object and class: where a recording lacks most. Empty where there is no box.
+         */
+        get: operations["coverage-objects-list"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/sessions/{sid}/coverage/tour": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Plan
+         * @description Views that fill the empty cells of objects' coverage, as a short tour. Nothing is stored.
+         */
+        post: operations["tour-plan"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/sessions/{sid}/frames": {
         parameters: {
             query?: never;
@@ -1319,6 +1422,29 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/sessions/{sid}/report": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Read
+         * @description A report of the session as an export with these options would write it; each means what it means there.
+         *
+         *     It comes in seconds also for long sessions: visible shares are then found in some thousand frames alone, unless
+         *     `min_visible` needs them all.
+         */
+        get: operations["report-read"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/login": {
         parameters: {
             query?: never;
@@ -1343,6 +1469,19 @@ export interface paths {
 export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
+        /**
+         * BinFrames
+         * @description The views of a bin, frame by frame.
+         */
+        BinFrames: {
+            /** Total */
+            total: number;
+            /**
+             * Items
+             * @description the first of them, `limit` at most, spread evenly over all
+             */
+            items: components["schemas"]["ViewJson-Output"][];
+        };
         /**
          * BoxAnswer
          * @description A virtual box; its ETag is its revision.
@@ -1424,7 +1563,7 @@ export interface components {
             /** Class Id */
             class_id: number;
             /** Views */
-            views: components["schemas"]["ViewJson"][];
+            views: components["schemas"]["ViewJson-Input"][];
             /**
              * Name
              * @description default: the class's name, with a number where it is taken
@@ -1675,6 +1814,22 @@ export interface components {
             distortion: number[];
         };
         /**
+         * CellLeftJson
+         * @description An empty cell that no view of the tour fills.
+         */
+        CellLeftJson: {
+            /** Box Id */
+            box_id: number;
+            /** Cell */
+            cell: number;
+            /**
+             * Reason
+             * @description what hinders the pose that got furthest; later: ask for more views
+             * @enum {string}
+             */
+            reason: "height" | "tilt" | "near" | "large" | "small" | "hidden" | "later";
+        };
+        /**
          * ChoiceJson
          * @description One value that an option can have.
          */
@@ -1683,6 +1838,40 @@ export interface components {
             value: string;
             /** Meaning */
             meaning: string;
+        };
+        /**
+         * ChoiceMade
+         * @description How frames were chosen, where more than their place in the recording decided.
+         *
+         *     A direction is an object seen from one of the cells of equal area round it, where it gets a label.
+         *
+         *     Attributes:
+         *         candidates: frames of the range or the list.
+         *         outside_sector: candidates that stand outside the sector.
+         *         near_twins: of the others, those left out because they are near twins of a chosen frame.
+         *         asked: how many were asked for; None: all that are left.
+         *         chosen: how many were chosen.
+         *         directions_of_candidates: how many directions all candidates show.
+         *         directions: how many the chosen frames show.
+         *         directions_evenly: how many as many evenly spaced frames would, of those that the sector and near twins leave.
+         */
+        ChoiceMade: {
+            /** Candidates */
+            candidates: number;
+            /** Outside Sector */
+            outside_sector: number;
+            /** Near Twins */
+            near_twins: number;
+            /** Asked */
+            asked: number | null;
+            /** Chosen */
+            chosen: number;
+            /** Directions Of Candidates */
+            directions_of_candidates: number;
+            /** Directions */
+            directions: number;
+            /** Directions Evenly */
+            directions_evenly: number;
         };
         /**
          * ClassAnswer
@@ -1855,6 +2044,61 @@ export interface components {
             frame: number;
         };
         /**
+         * CoverageJson
+         * @description From where objects are seen: theta = polar angle from +z, phi = azimuth, in the box's frame, radians.
+         */
+        CoverageJson: {
+            /**
+             * Azimuth Edges
+             * @description from -pi to pi
+             */
+            azimuth_edges: number[];
+            /**
+             * Polar Edges
+             * @description from 0 to pi
+             */
+            polar_edges: number[];
+            /**
+             * Counts
+             * @description views by azimuth bin, then by polar bin
+             */
+            counts: number[][];
+            /**
+             * Reachable
+             * @description false: the class's symmetry folds all of the bin elsewhere
+             */
+            reachable: boolean[][];
+            equal_area: components["schemas"]["EqualAreaJson"];
+            /**
+             * Frames
+             * @description in which any of the objects is labelled
+             */
+            frames: number;
+            /**
+             * Views
+             * @description labels of the objects in all frames
+             */
+            views: number;
+            /**
+             * Empty Fraction
+             * @description of the reachable bins of equal angles, those without a view
+             */
+            empty_fraction: number;
+        };
+        /**
+         * DirectionsSeen
+         * @description How many directions the frames show objects from. A direction is an object seen from one of the cells of equal
+         *     area round it, where it gets a label; views that look alike by the class's symmetry are one.
+         */
+        DirectionsSeen: {
+            /** All */
+            all: number;
+            /** Splits */
+            splits: {
+                [key: string]: number;
+            };
+        };
+        /**
          * DuplicateDraft
          * @description Where the copy of a box goes.
          */
@@ -1926,6 +2170,46 @@ export interface components {
             ][][];
         };
         /**
+         * EqualAreaJson
+         * @description The cells of equal area.
+         */
+        EqualAreaJson: {
+            /**
+             * Directions
+             * @description the middle of each cell, in the box's frame
+             */
+            directions: [
+                number,
+                number,
+                number
+            ][];
+            /**
+             * Counts
+             * @description views in each cell
+             */
+            counts: number[];
+            /**
+             * Reachable
+             * @description false: the class's symmetry folds all directions of the cell elsewhere
+             */
+            reachable: boolean[];
+            /**
+             * Bands
+             * @description cells in each band from +z downward; they follow one another by azimuth
+             */
+            bands: number[];
+            /**
+             * Band Edges
+             * @description z of the bands' edges, from 1 down to -1
+             */
+            band_edges: number[];
+            /**
+             * Empty Fraction
+             * @description of the reachable cells: the share of all directions without a view
+             */
+            empty_fraction: number;
+        };
+        /**
          * ExportDraft
          * @description An export to start.
          */
@@ -1938,6 +2222,9 @@ export interface components {
             /**
              * @default {
              *       "frames": {
+             *         "by": "coverage",
+             *         "near_degrees": 0,
+             *         "near_frames": 0,
              *         "start": 0,
              *         "step": 1
              *       },
@@ -1949,6 +2236,7 @@ export interface components {
              *       "heading_bins": 18,
              *       "split": {
              *         "by": "block",
+             *         "hold_out": [],
              *         "seed": 0,
              *         "test": 0,
              *         "train": 0.8,
@@ -2021,7 +2309,10 @@ export interface components {
             /**
              * @default {
              *       "step": 1,
-             *       "start": 0
+             *       "start": 0,
+             *       "by": "coverage",
+             *       "near_degrees": 0,
+             *       "near_frames": 0
              *     }
              */
             frames: components["schemas"]["FrameChoice"];
@@ -2074,6 +2365,7 @@ export interface components {
              *       "val": 0.2,
              *       "test": 0,
              *       "by": "block",
+             *       "hold_out": [],
              *       "seed": 0
              *     }
              */
@@ -2137,6 +2429,29 @@ export interface components {
              * @description over the label files: the SHA-256 of what `sha256sum` prints for them in byte order of their paths
              */
             sha256: string;
+        };
+        /**
+         * FillJson
+         * @description An empty cell that a view fills.
+         */
+        FillJson: {
+            /** Box Id */
+            box_id: number;
+            /**
+             * Cell
+             * @description of equal area, as the coverage counts them
+             */
+            cell: number;
+            /**
+             * Azimuth
+             * @description of the view in the box's frame, folded by the symmetry, radians
+             */
+            azimuth: number;
+            /**
+             * Polar
+             * @description likewise, from +z
+             */
+            polar: number;
         };
         /**
          * FitJson
@@ -2220,6 +2535,14 @@ export interface components {
              * @description what of the session the format cannot hold, one line each
              */
             losses: string[];
+            directions: components["schemas"]["DirectionsSeen"];
+            /** @description how the frames were chosen, beside all candidates and even spacing; null: by their place alone */
+            choice: components["schemas"]["ChoiceMade"] | null;
+            /**
+             * Notes
+             * @description where the choice or the splits hold less than was asked for, one line each
+             */
+            notes: string[];
             images: components["schemas"]["ImageCounts"];
             /**
              * Image Bytes
@@ -2252,6 +2575,8 @@ export interface components {
         /**
          * FrameChoice
          * @description Which frames of each session: every `step`-th from `start` up to, not including, `stop`; or those listed.
+         *
+         *     Of these only what lies in `sector`, without near twins; and of that `count` frames of all sessions together.
          */
         FrameChoice: {
             /**
@@ -2276,6 +2601,43 @@ export interface components {
              * @description numbers of frames, instead of the three options above
              */
             list?: number[] | null;
+            /**
+             * How many frames
+             * @description so many of all sessions together, chosen from those that the other options leave; empty: all
+             */
+            count?: number | null;
+            /**
+             * Chosen by
+             * @description how that many frames are chosen
+             * @default coverage
+             * @enum {string}
+             */
+            by: "coverage" | "even";
+            /**
+             * Near twins by view
+             * @description a frame that shows its objects from so nearly the same side as a chosen one, and from a distance within a tenth, is left out; 0 keeps all
+             * @default 0
+             */
+            near_degrees: number;
+            /**
+             * Near twins by time
+             * @description frames that are so few frames before or after a chosen one are left out; 0 keeps all
+             * @default 0
+             */
+            near_frames: number;
+            /**
+             * Cameras from one side
+             * @description only cameras between two angles round the objects, in degrees about the world's z axis: 0 to 180 is half the sphere; empty: all round
+             */
+            sector?: [
+                number,
+                number
+            ] | null;
+            /**
+             * Angles round box
+             * @description id of the box that they are about; empty: the middle of all boxes
+             */
+            sector_box?: number | null;
         };
         /**
          * FrameJson
@@ -2484,7 +2846,7 @@ export interface components {
          */
         HullPreviewDraft: {
             /** Views */
-            views: components["schemas"]["ViewJson"][];
+            views: components["schemas"]["ViewJson-Input"][];
             /**
              * Widen Px
              * @default 0
@@ -2807,7 +3169,7 @@ export interface components {
              * @default auto
              * @enum {string}
              */
-            format: "auto" | "bop" | "coco" | "cvat";
+            format: "auto" | "bop" | "coco" | "cvat" | "voc" | "yolo";
             /**
              * Dry Run
              * @description say what would come in, and store nothing
@@ -3366,6 +3728,39 @@ export interface components {
             reason: string;
         };
         /**
+         * ObjectCoverage
+         * @description How much of an object, or of a class's objects together, is seen.
+         */
+        ObjectCoverage: {
+            /** Class Id */
+            class_id: number;
+            /**
+             * Box Id
+             * @description null: all of the class
+             */
+            box_id: number | null;
+            /**
+             * Frames
+             * @description in which it is labelled
+             */
+            frames: number;
+            /** Views */
+            views: number;
+            /**
+             * Empty Fraction
+             * @description share of all directions, in cells of equal area, without a view
+             */
+            empty_fraction: number;
+        };
+        /**
+         * ObjectsCoverage
+         * @description All boxes, then all classes that have some.
+         */
+        ObjectsCoverage: {
+            /** Items */
+            items: components["schemas"]["ObjectCoverage"][];
+        };
+        /**
          * ObservationJson
          * @description Where the point is seen in a frame; image coordinates of the original image.
          */
@@ -3396,7 +3791,7 @@ export interface components {
              * @description of its value; integers and texts are lists
              * @enum {string}
              */
-            type: "integer" | "number" | "choice" | "integers" | "texts";
+            type: "integer" | "number" | "choice" | "integers" | "texts" | "range";
             /**
              * Optional
              * @description whether it may be null, which then is its default
@@ -3663,6 +4058,31 @@ export interface components {
         PolygonsAnswer: {
             /** Polygons */
             polygons: components["schemas"]["PolygonAnswer"][];
+        };
+        /**
+         * PoseJson
+         * @description A rigid transform.
+         */
+        PoseJson: {
+            /**
+             * Position
+             * @description metres
+             */
+            position: [
+                number,
+                number,
+                number
+            ];
+            /**
+             * Wxyz
+             * @description unit quaternion, w first and >= 0
+             */
+            wxyz: [
+                number,
+                number,
+                number,
+                number
+            ];
         };
         /**
          * PreviewBoxJson
@@ -4095,7 +4515,7 @@ export interface components {
          * @description How frames are divided.
          *
          *     `block`: contiguous runs, so that neighbours do not fall on both sides; `frame`: frame by frame at random;
-         *     `session`: whole sessions. Shares must add up to 1.
+         *     `session`: whole sessions; `sector`: by where cameras stand round the objects. Shares must add up to 1.
          */
         SplitChoice: {
             /**
@@ -4122,7 +4542,13 @@ export interface components {
              * @default block
              * @enum {string}
              */
-            by: "block" | "frame" | "session";
+            by: "block" | "frame" | "session" | "sector";
+            /**
+             * Sessions held out
+             * @description of a split by session: these are for validation or test, and all others for training
+             * @default []
+             */
+            hold_out: string[];
             /**
              * Seed
              * @description another number divides the frames another way
@@ -4250,6 +4676,202 @@ export interface components {
             ];
         };
         /**
+         * TourDraft
+         * @description Which views are wanted.
+         */
+        TourDraft: {
+            /**
+             * Box Ids
+             * @description absent: all objects
+             */
+            box_ids?: number[] | null;
+            /**
+             * Class Id
+             * @description the objects of a class
+             */
+            class_id?: number | null;
+            /**
+             * Count
+             * @description views at most
+             * @default 20
+             */
+            count: number;
+            /**
+             * Distance
+             * @description metres to the object looked at; absent: as the frames have it
+             */
+            distance?: [
+                number,
+                number
+            ] | null;
+            /**
+             * Height
+             * @description z of the camera in the world, metres; absent: as the frames have it
+             */
+            height?: [
+                number,
+                number
+            ] | null;
+            /**
+             * Tilt
+             * @description of the camera's axis below the horizontal, radians; absent: likewise
+             */
+            tilt?: [
+                number,
+                number
+            ] | null;
+            /**
+             * Min Visible
+             * @description share of an object that is seen, in frames that count and in views proposed; absent: frames count as in the coverage without it, and views show at least half
+             */
+            min_visible?: number | null;
+            /** Shape */
+            shape?: ("box" | "hull" | "mesh") | null;
+            /**
+             * Azimuth Bins
+             * @default 36
+             */
+            azimuth_bins: number;
+            /**
+             * Polar Bins
+             * @default 18
+             */
+            polar_bins: number;
+            /**
+             * Start Frame
+             * @description frame at which the tour begins; absent: the last
+             */
+            start_frame?: number | null;
+        };
+        /**
+         * TourJson
+         * @description Views that fill empty cells of objects' coverage, in the order of a short tour. What stands between them is not
+         *     looked at: how to get from one to the next is the robot's to plan.
+         */
+        TourJson: {
+            /** Views */
+            views: components["schemas"]["TourViewJson"][];
+            /** @description camera pose at which the tour begins */
+            start: components["schemas"]["PoseJson"];
+            /**
+             * Length
+             * @description metres from the start through all views
+             */
+            length: number;
+            /**
+             * Turn
+             * @description radians that the camera turns on the way
+             */
+            turn: number;
+            limits: components["schemas"]["TourLimitsJson"];
+            /**
+             * Cells
+             * @description of all chosen objects, those that their symmetry leaves
+             */
+            cells: number;
+            /**
+             * Cells Empty
+             * @description of them, those that no frame lies in
+             */
+            cells_empty: number;
+            /**
+             * Cells Filled
+             * @description of the empty ones, those that the views fill
+             */
+            cells_filled: number;
+            /**
+             * Cells Left
+             * @description the other empty ones
+             */
+            cells_left: components["schemas"]["CellLeftJson"][];
+            /** Left By Reason */
+            left_by_reason: {
+                [key: string]: number;
+            };
+        };
+        /**
+         * TourLimitsJson
+         * @description What the views keep to.
+         */
+        TourLimitsJson: {
+            /**
+             * Distance
+             * @description metres
+             */
+            distance: [
+                number,
+                number
+            ];
+            /**
+             * Height
+             * @description metres
+             */
+            height: [
+                number,
+                number
+            ];
+            /**
+             * Tilt
+             * @description radians
+             */
+            tilt: [
+                number,
+                number
+            ];
+            /** Min Visible */
+            min_visible: number;
+            /**
+             * Clearance
+             * @description metres to the nearest box
+             */
+            clearance: number;
+            /**
+             * From Recording
+             * @description those that nobody gave: as the recording's frames are, widened
+             */
+            from_recording: string[];
+        };
+        /**
+         * TourViewJson
+         * @description A view to take.
+         */
+        TourViewJson: {
+            /** @description OpenCV camera axes: x right, y down, z forward */
+            T_world_camera: components["schemas"]["PoseJson"];
+            /** @description of the wrist that holds the camera; null: unknown how it does */
+            T_world_wrist: components["schemas"]["PoseJson"] | null;
+            /**
+             * Box Id
+             * @description the object looked at; the image's x is horizontal
+             */
+            box_id: number;
+            /**
+             * Boxes
+             * @description ids of all boxes that an export would label there
+             */
+            boxes: number[];
+            /**
+             * Fills
+             * @description cells that no frame and no view chosen before it fills
+             */
+            fills: components["schemas"]["FillJson"][];
+            /**
+             * Distance
+             * @description metres to the centre of the object looked at
+             */
+            distance: number;
+            /**
+             * Height
+             * @description z in the world, metres
+             */
+            height: number;
+            /**
+             * Tilt
+             * @description of the camera's axis below the horizontal, radians
+             */
+            tilt: number;
+        };
+        /**
          * TransformAnswer
          * @description A rigid transform.
          */
@@ -4320,7 +4942,7 @@ export interface components {
          * ViewJson
          * @description The object's outline in one frame.
          */
-        ViewJson: {
+        "ViewJson-Input": {
             /**
              * Polygons
              * @description what an odd number of their rings enclose is inside; at most 20000 corners in all
@@ -4333,6 +4955,16 @@ export interface components {
             mask_png?: string | null;
             /** Frame */
             frame: number;
+        };
+        /**
+         * ViewJson
+         * @description A frame that sees an object from the bin.
+         */
+        "ViewJson-Output": {
+            /** Frame */
+            frame: number;
+            /** Box Id */
+            box_id: number;
         };
         /**
          * ViewMisfit
@@ -4424,6 +5056,61 @@ export interface components {
             yours: components["schemas"]["PlacedJson"];
             /** @description as it is now; null: deleted */
             current: components["schemas"]["BoxAnswer"] | null;
+        };
+        /**
+         * CoverageSightJson
+         * @description A sphere round a box: how many views there are of it from each direction.
+         */
+        CoverageSightJson: {
+            /** Box Id */
+            box_id: number;
+            /**
+             * Whole Class
+             * @description count views of all objects of the box's class
+             */
+            whole_class: boolean;
+            /** Azimuth Bins */
+            azimuth_bins: number;
+            /** Polar Bins */
+            polar_bins: number;
+            /**
+             * Min Visible
+             * @description of an object, for a view to count
+             */
+            min_visible: number;
+            /**
+             * Chosen Bin
+             * @description outlined: azimuth bin * polar bins + polar bin
+             * @default null
+             */
+            chosen_bin: number | null;
+            /**
+             * Chosen Cell
+             * @description or a cell of equal area
+             * @default null
+             */
+            chosen_cell: number | null;
+        };
+        /**
+         * DirectionPickedMessage
+         * @description The coverage's sphere was clicked; the direction is folded by the object's symmetry.
+         */
+        DirectionPickedMessage: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            type: "direction";
+            /**
+             * Bin
+             * @description of equal angles: azimuth bin * polar bins + polar bin
+             */
+            bin: number;
+            /**
+             * Cell
+             * @description of equal area
+             */
+            cell: number;
         };
         /**
          * DraggedMessage
@@ -4561,7 +5248,7 @@ export interface components {
          * LiveToPage
          * @description A message from the server to the page.
          */
-        LiveToPage: components["schemas"]["ReadyMessage"] | components["schemas"]["ResetMessage"] | components["schemas"]["EditMessage"] | components["schemas"]["GoneMessage"] | components["schemas"]["HereMessage"] | components["schemas"]["PickedMessage"] | components["schemas"]["EnteredMessage"] | components["schemas"]["DraggedMessage"] | components["schemas"]["ConflictedMessage"] | components["schemas"]["RefusedMessage"];
+        LiveToPage: components["schemas"]["ReadyMessage"] | components["schemas"]["ResetMessage"] | components["schemas"]["EditMessage"] | components["schemas"]["GoneMessage"] | components["schemas"]["HereMessage"] | components["schemas"]["PickedMessage"] | components["schemas"]["DirectionPickedMessage"] | components["schemas"]["EnteredMessage"] | components["schemas"]["DraggedMessage"] | components["schemas"]["ConflictedMessage"] | components["schemas"]["RefusedMessage"];
         /**
          * LookMessage
          * @description Turn the free camera to something.
@@ -4835,6 +5522,17 @@ export interface components {
             hidden: number[];
             /** Dark */
             dark: boolean;
+            /**
+             * @description a sphere in the scene; null: none
+             * @default null
+             */
+            coverage: components["schemas"]["CoverageSightJson"] | null;
+            /**
+             * Tour
+             * @description T_world_camera of cameras proposed next, in their order
+             * @default []
+             */
+            tour: components["schemas"]["TransformJson"][];
         };
         /**
          * ViewsProblem
@@ -6955,6 +7653,493 @@ export interface operations {
             };
         };
     };
+    "coverage-read": {
+        parameters: {
+            query?: {
+                /** @description one object; default: all of them together */
+                box_id?: number | null;
+                /** @description the objects of a class */
+                class_id?: number | null;
+                azimuth_bins?: number;
+                polar_bins?: number;
+                /** @description views in which less of an object is seen do not count */
+                min_visible?: number;
+                /** @description default: the hull where a box has one, else the box */
+                shape?: ("box" | "hull" | "mesh") | null;
+            };
+            header?: never;
+            path: {
+                sid: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CoverageJson"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "coverage-picture": {
+        parameters: {
+            query?: {
+                /** @description one object; default: all of them together */
+                box_id?: number | null;
+                /** @description the objects of a class */
+                class_id?: number | null;
+                azimuth_bins?: number;
+                polar_bins?: number;
+                /** @description views in which less of an object is seen do not count */
+                min_visible?: number;
+                /** @description default: the hull where a box has one, else the box */
+                shape?: ("box" | "hull" | "mesh") | null;
+            };
+            header?: never;
+            path: {
+                sid: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description the histograms as PNG */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "image/png": unknown;
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "coverage-frames-list": {
+        parameters: {
+            query?: {
+                /** @description one object; default: all of them together */
+                box_id?: number | null;
+                /** @description the objects of a class */
+                class_id?: number | null;
+                azimuth_bins?: number;
+                polar_bins?: number;
+                /** @description views in which less of an object is seen do not count */
+                min_visible?: number;
+                /** @description default: the hull where a box has one, else the box */
+                shape?: ("box" | "hull" | "mesh") | null;
+                /** @description a bin of equal angles, with `polar` */
+                azimuth?: number | null;
+                polar?: number | null;
+                /** @description or a cell of equal area */
+                cell?: number | null;
+                limit?: number;
+            };
+            header?: never;
+            path: {
+                sid: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BinFrames"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "coverage-objects-list": {
+        parameters: {
+            query?: {
+                azimuth_bins?: number;
+                polar_bins?: number;
+                /** @description views in which less of an object is seen do not count */
+                min_visible?: number;
+                /** @description default: the hull where a box has one, else the box */
+                shape?: ("box" | "hull" | "mesh") | null;
+            };
+            header?: never;
+            path: {
+                sid: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ObjectsCoverage"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "tour-plan": {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description a repeat with the same key answers what the first answered, and does nothing */
+                "idempotency-key"?: string | null;
+            };
+            path: {
+                sid: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["TourDraft"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["TourJson"];
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description beyond a limit, which the detail names */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     "frames-list": {
         parameters: {
             query?: {
@@ -7749,14 +8934,14 @@ export interface operations {
                 "multipart/form-data": {
                     /**
                      * Format: binary
-                     * @description a COCO or CVAT file, or a zip with one, or with a BOP scene and its models
+                     * @description a COCO or CVAT file, or a zip with labels of any format
                      */
                     file: string;
                     /**
                      * @default auto
                      * @enum {string}
                      */
-                    format?: "auto" | "bop" | "coco" | "cvat";
+                    format?: "auto" | "bop" | "coco" | "cvat" | "voc" | "yolo";
                     /**
                      * @default false
                      * @enum {string}
@@ -12603,6 +13788,109 @@ export interface operations {
             };
             /** @description the request comes from another origin */
             403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the Host header names another server */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request cannot be used as it is */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ValidationProblem"];
+                };
+            };
+            /** @description a fault of the server, logged there under the number in the detail */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the sessions folder cannot be used */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "report-read": {
+        parameters: {
+            query?: {
+                /** @description every N-th frame */
+                frames_step?: number;
+                frames_start?: number;
+                /** @description default: to the end */
+                frames_stop?: number | null;
+                /** @description default: the hull where a box has one, else the box */
+                shape?: ("box" | "hull" | "mesh") | null;
+                min_visible?: number;
+                max_truncated?: number;
+                min_area_px?: number;
+                split_train?: number;
+                split_val?: number;
+                split_test?: number;
+                split_by?: "block" | "frame";
+                split_seed?: number;
+                /** @description offer it as a file instead of showing it */
+                save?: boolean;
+            };
+            header?: never;
+            path: {
+                sid: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description the page */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/html": string;
+                };
+            };
+            /** @description no token, a wrong one, or a cookie that has ended */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the request comes from another origin */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a thing named in the path is not there */
+            404: {
                 headers: {
                     [name: string]: unknown;
                 };

@@ -261,6 +261,38 @@ export const cancelOutline = (sid, id) => request("POST", under(sid, `/outline-j
 /** @param {string} sid @param {number} id @param {number} revision @param {object} wish @returns {Promise<import("./store.js").Refinement>} */
 export const refineBox = (sid, id, revision, wish) => request("POST", under(sid, `/boxes/${id}/refine`), { revision, body: wish });
 
+// Coverage.
+
+/** @typedef {import("./store.js").Seen} Seen */
+/** @typedef {import("./store.js").Counting} Counting */
+
+/** @param {Counting} counting */
+const counted = ({ degrees, min_visible }) => ({ azimuth_bins: 360 / degrees, polar_bins: 180 / degrees, min_visible });
+
+/** @param {string} sid @param {Seen} of @param {Counting} counting @param {AbortSignal} [signal] @returns {Promise<Schemas["CoverageJson"]>} */
+export const coverage = (sid, of, counting, signal) => request("GET", coverageAddress(sid, of, counting, "json"), { signal });
+
+/** @param {string} sid @param {Counting} counting @param {AbortSignal} [signal] @returns {Promise<Schemas["ObjectsCoverage"]>} */
+export const coverageOfObjects = (sid, counting, signal) =>
+  request("GET", under(sid, `/coverage/objects?${query(counted(counting))}`), { signal });
+
+/**
+ * @param {string} sid @param {Seen} of @param {Counting} counting @param {import("./store.js").Direction} direction @param {AbortSignal} [signal]
+ * @returns {Promise<Schemas["BinFrames"]>}
+ */
+export function coverageFrames(sid, of, counting, { by, index }, signal) {
+  const polar = 180 / counting.degrees;
+  const where = by === "area" ? { cell: index } : { azimuth: Math.floor(index / polar), polar: index % polar };
+  return request("GET", under(sid, `/coverage/frames?${query({ ...of, ...counted(counting), ...where })}`), { signal });
+}
+
+/** @param {string} sid @param {Seen} of @param {Counting} counting @param {"json" | "png"} as */
+export const coverageAddress = (sid, of, counting, as) =>
+  under(sid, `/coverage${as === "png" ? "/picture" : ""}?${query({ ...of, ...counted(counting) })}`);
+
+/** @param {string} sid @param {object} wish @returns {Promise<Schemas["TourJson"]>} */
+export const planTour = (sid, wish) => request("POST", under(sid, "/coverage/tour"), { body: wish, key: true });
+
 // Exports.
 
 /** @returns {Promise<Schemas["FormatsJson"]>} */

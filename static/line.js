@@ -174,7 +174,26 @@ function sendView() {
     upright: store.upright.value,
     hidden: [...store.hidden.value],
     dark: store.theme.value === "dark",
+    ...coverageView(),
   });
+}
+
+/** What Coverage mode has the scene show beside the boxes. */
+function coverageView() {
+  const box = store.sphereBox.value;
+  if (store.mode.value !== "coverage") return {};
+  const { by, index } = store.direction.value ?? {};
+  return {
+    coverage: box === null ? null : {
+      box_id: box,
+      whole_class: "class_id" in (store.seen.value ?? {}),
+      ...store.binsOf(store.counting.value),
+      min_visible: store.counting.value.min_visible,
+      chosen_bin: by === "angle" ? index : null,
+      chosen_cell: by === "area" ? index : null,
+    },
+    tour: store.tour.value,
+  };
 }
 
 /** @param {any} message */
@@ -197,6 +216,10 @@ function take(message) {
       return;
     case "picked":
       batch(() => picked(message));
+      return;
+    case "direction":
+      store.setProblem("scene", null);
+      store.direction.value = store.byArea.value ? { by: "area", index: message.cell } : { by: "angle", index: message.bin };
       return;
     case "entered":
       if (message.frame === store.frame.value) store.entered.value = message.frame;

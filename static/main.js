@@ -14,6 +14,8 @@ const PAGE = /** @type {HTMLElement} */ (document.getElementById("page"));
 const NAMES = 200;
 
 const sid = () => store.sid.value;
+/** Where leaving a frame leads back to. @type {"scene" | "coverage"} */
+let cameFrom = "scene";
 
 Object.assign(
   store.actions,
@@ -59,11 +61,12 @@ Object.assign(
     enterFrame: (index) => {
       if (index !== undefined) goTo(index);
       store.tool.value = store.tool.value === "points" ? "select" : store.tool.value;
+      if (store.mode.value !== "frame") cameFrom = store.mode.value === "coverage" ? "coverage" : "scene";
       store.mode.value = "frame";
     },
-    leaveFrame: () => (store.mode.value = "scene"),
+    leaveFrame: () => (store.mode.value = cameFrom),
     look: (at) => {
-      if (store.mode.value !== "scene") store.mode.value = "scene";
+      if (store.mode.value !== "scene" && store.mode.value !== "coverage") store.mode.value = "scene";
       line.send({ type: "look", at });
     },
     introduce: line.introduce,
@@ -82,6 +85,12 @@ Object.assign(
       if (found === undefined) throw new Error(`frame ${index} names camera ${camera_id}, which the session does not have`);
       return found;
     },
+
+    coverage: (of, counting, signal) => api.coverage(sid(), of, counting, signal),
+    coverageOfObjects: async (counting, signal) => (await api.coverageOfObjects(sid(), counting, signal)).items,
+    coverageFrames: (of, counting, direction, signal) => api.coverageFrames(sid(), of, counting, direction, signal),
+    planTour: (wish) => api.planTour(sid(), wish),
+    coverageAddress: (of, counting, as) => api.coverageAddress(sid(), of, counting, as),
 
     formats: api.formats,
     previewExport: (format, options, signal) => api.previewExport(sid(), format, options, signal),
@@ -185,7 +194,7 @@ function restoreView() {
   const mode = parts.get("mode");
   const box = Number(parts.get("box") ?? NaN);
   goTo(Number(parts.get("frame") ?? Math.floor(store.frames.value / 2)) || 0);
-  if (mode === "frame" || mode === "masks" || mode === "export") store.mode.value = mode;
+  if (mode === "frame" || mode === "masks" || mode === "coverage" || mode === "export") store.mode.value = mode;
   if (store.isObject(box)) store.selected.value = box;
 }
 

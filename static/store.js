@@ -38,12 +38,18 @@ import { computed, signal } from "./lib/view.js";
  * @property {[number, number, number]} size metres
  */
 
+/** From where objects are seen. @typedef {Schemas["CoverageJson"]} Coverage */
+/** Where to look next. @typedef {Schemas["TourJson"]} Tour */
+/** Whose views are counted: an object's, or those of a class's objects together. @typedef {{box_id: number} | {class_id: number}} Seen */
+/** How views are counted: degrees a bin is wide, and how much of an object a view must show. @typedef {{degrees: number, min_visible: number}} Counting */
+/** A bin of equal angles, azimuth bin * polar bins + polar bin, or a cell of equal area. @typedef {{by: "angle" | "area", index: number}} Direction */
+
 /**
  * A recording that may become a session: below a declared root, or in an upload; paths are relative to it.
  * @typedef {{root?: string, upload?: string, path: string, format: string, images?: string, camera?: string}} Source
  */
 
-/** @typedef {"scene" | "frame" | "masks" | "export"} Mode */
+/** @typedef {"scene" | "frame" | "masks" | "coverage" | "export"} Mode */
 /** @typedef {"select" | "move" | "rotate" | "resize" | "points"} Tool */
 
 /**
@@ -165,6 +171,39 @@ export const classOfNew = computed(() => {
   return known ?? [...classes.value.keys()][0] ?? null;
 });
 
+/** A class whose objects' views are counted together; null: those of the selected box, or the first. */
+export const coverageClass = signal(/** @type {number | null} */ (null));
+/** Whose views are counted; null: there is no box. @type {import("./lib/view.js").ReadonlySignal<Seen | null>} */
+export const seen = computed(() => {
+  const of = coverageClass.value;
+  if (of !== null && [...boxes.value.values()].some((box) => box.class_id === of)) return { class_id: of };
+  const box = selectedBox.value ?? firstBox(() => true);
+  return box === null ? null : { box_id: box.id };
+});
+export const counting = signal(/** @type {Counting} */ ({ degrees: 20, min_visible: 0 }));
+/** Whether the map has cells of equal area rather than bins of equal angles. */
+export const byArea = signal(false);
+/** The direction whose frames are shown; of the kind that the map has. */
+export const direction = signal(/** @type {Direction | null} */ (null));
+/** The cameras of the tour that is shown in the scene. */
+export const tour = signal(/** @type {readonly Transform[]} */ ([]));
+/** The box that the sphere stands round: of a class the selected one or the first. */
+export const sphereBox = computed(() => {
+  const of = seen.value;
+  if (of === null) return null;
+  if ("box_id" in of) return of.box_id;
+  const box = selectedBox.value?.class_id === of.class_id ? selectedBox.value : firstBox((one) => one.class_id === of.class_id);
+  return box?.id ?? null;
+});
+
+/** The box of the least id that is meant. @param {(box: Box) => boolean} isMeant */
+function firstBox(isMeant) {
+  return [...boxes.value.values()].filter(isMeant).sort((a, b) => a.id - b.id)[0] ?? null;
+}
+
+/** How many bins there are round and from top to bottom. @param {Counting} of */
+export const binsOf = ({ degrees }) => ({ azimuth_bins: 360 / degrees, polar_bins: 180 / degrees });
+
 /** @param {string} place @param {string | null} text null: nothing is wrong there any more */
 export function setProblem(place, text) {
   const next = new Map(problems.value);
@@ -247,6 +286,12 @@ export function setProblem(place, text) {
  * @property {(id: string) => Promise<Export>} cancelExport
  * @property {(id: string) => Promise<void>} removeExport
  * @property {(id: string) => string} downloadAddress
+ *
+ * @property {(of: Seen, counting: Counting, signal?: AbortSignal) => Promise<Coverage>} coverage
+ * @property {(counting: Counting, signal?: AbortSignal) => Promise<readonly Schemas["ObjectCoverage"][]>} coverageOfObjects boxes, then classes
+ * @property {(of: Seen, counting: Counting, direction: Direction, signal?: AbortSignal) => Promise<Schemas["BinFrames"]>} coverageFrames
+ * @property {(of: Seen, counting: Counting, as: "json" | "png") => string} coverageAddress
+ * @property {(wish: object) => Promise<Tour>} planTour where to look next
  *
  * @property {() => Promise<Session[]>} sessions
  * @property {(session: Session, name: string) => Promise<Session>} renameOf

@@ -7,11 +7,14 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryFile
 from types import ModuleType
 
 import pytest
 from hypothesis import settings
 from jaxtyping import install_import_hook
+from xdist.remote import Producer
+from xdist.scheduler import LoadFileScheduling
 
 # Property tests look at what is answered, not at how busy the machine is.
 settings.register_profile("untimed", deadline=None)
@@ -60,6 +63,10 @@ install_import_hook(
             "instance_masks",
             "run_lengths",
             "hidden_points",
+            "cell_samples",
+            "view_limits",
+            "view_proposals",
+            "view_tour",
         )
     ],
     "beartype.beartype",
@@ -90,14 +97,18 @@ def _served(sessions: Path, *options: str) -> Iterator[tuple[subprocess.Popen[st
     command = [sys.executable, "-m", "ars_web", "serve", "--sessions", str(sessions), "--port", "0", *options]
     # The ars_web beside this file, whether or not one is installed.
     search = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=search)
-    try:
-        said = [process.stdout.readline() for _ in range(2)]
-        assert "/login?code=" in said[-1], "".join(said) + process.stderr.read()
-        yield process, said[-1].split()[-1]
-    finally:
-        process.kill()
-        process.communicate()
+    with TemporaryFile("w+") as log:  # a pipe that nobody reads would stop a server that has much to say
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True, env=search)
+        try:
+            said = [process.stdout.readline() for _ in range(2)]
+            if "/login?code=" not in said[-1]:
+                process.wait()
+                log.seek(0)
+                raise AssertionError("".join(said) + log.read())
+            yield process, said[-1].split()[-1]
+        finally:
+            process.kill()
+            process.communicate()
 
 
 @pytest.fixture(scope="session")
@@ -151,6 +162,38 @@ def s3(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]:
     """An S3 server with an empty bucket called `bucket`, and the environment variables by which it is found."""
     with _beside("s3_server").running_s3(tmp_path_factory.mktemp("s3") / "log") as found:
         yield found
+
+
+SCENES = ("tests/browser/scene/", "tests/browser/workspace/", "tests/browser/test_scene_security.py")
+"""Tests that have scenes drawn in software, which takes most of a machine: no two of them run at once."""
+
+LONG = ("tests/faults/", "tests/recorded/", "tests/demo/", "tests/datasets/test_cluster.py", "tests/test_cli.py")
+"""Few tests that take long: begun early, so that none is all that is left in the end."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Scenes first, then what takes long; the other browser tests last, when no scene is drawn any more."""
+
+    def place(item: pytest.Item) -> int:
+        if item.nodeid.startswith(SCENES):
+            return 0
+        if item.nodeid.startswith("tests/browser/"):
+            return 3
+        return 1 if item.nodeid.startswith(LONG) else 2
+
+    items.sort(key=place)
+
+
+class ByFile(LoadFileScheduling):
+    """Deals each file to one of several processes, and all scenes to one."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        return "scenes" if nodeid.startswith(SCENES) else super()._split_scope(nodeid)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> ByFile | None:
+    return ByFile(config, log) if config.getoption("dist") == "loadfile" else None
 
 
 def pytest_report_header() -> str:

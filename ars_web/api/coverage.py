@@ -43,6 +43,22 @@ class BinFrames(BaseModel):
     items: list[ViewJson] = Field(description="the first of them, `limit` at most, spread evenly over all")
 
 
+class ObjectCoverage(BaseModel):
+    """How much of an object, or of a class's objects together, is seen."""
+
+    class_id: int
+    box_id: int | None = Field(description="null: all of the class")
+    frames: int = Field(description="in which it is labelled")
+    views: int
+    empty_fraction: float = Field(description="share of all directions, in cells of equal area, without a view")
+
+
+class ObjectsCoverage(BaseModel):
+    """All boxes, then all classes that have some."""
+
+    items: list[ObjectCoverage]
+
+
 @router.get("", operation_id="coverage-read", response_model=CoverageJson, responses=documented(404))
 def read(
     sid: str,
@@ -116,6 +132,40 @@ def frames(
     spread = [found[(2 * i + 1) * len(found) // (2 * count)] for i in range(count)]
     items = [{"frame": frame, "box_id": views.box_ids[row]} for frame, row in spread]
     return JsonResponse({"total": len(found), "items": items})
+
+
+@router.get("/objects", operation_id="coverage-objects-list", response_model=ObjectsCoverage, responses=documented(404))
+def objects(
+    sid: str,
+    services: ServicesDep,
+    azimuth_bins: Bins = 36,
+    polar_bins: Bins = 18,
+    min_visible: MinVisible = 0.0,
+    shape: Shape = None,
+) -> Response:
+    """How much is seen of each object and class: where a recording lacks most. Empty where there is no box."""
+    bins = SphereBins(azimuth_bins, polar_bins)
+    if not services.store.snapshot(sid).state.boxes:
+        return JsonResponse({"items": []})
+    _, views, rows = _views(services, sid, None, None, min_visible, shape)
+    chosen: list[tuple[int, int | None, list[int]]] = [
+        (views.class_ids[row], views.box_ids[row], [row]) for row in rows
+    ]
+    for class_id in sorted(set(views.class_ids)):
+        chosen.append((class_id, None, [row for row in rows if views.class_ids[row] == class_id]))
+    items: list[dict[str, int | float | None]] = []
+    for class_id, box_id, of in chosen:
+        found = coverage_of(views, bins, of)
+        items.append(
+            {
+                "class_id": class_id,
+                "box_id": box_id,
+                "frames": found.frames,
+                "views": found.views,
+                "empty_fraction": found.empty_area,
+            }
+        )
+    return JsonResponse({"items": items})
 
 
 def _views(

@@ -17,11 +17,14 @@ from ars_web.sessions.boxes_json import Id, Size, TransformJson, transform_json
 from ars_web.workspace import (
     BoxPreview,
     Conflicted,
+    CoverageSight,
+    DirectionPicked,
     Dragged,
     Entered,
     Look,
     NewBox,
     Picked,
+    ProposedCamera,
     Refused,
     Tool,
     ViewEvent,
@@ -51,6 +54,46 @@ class HelloMessage(_FromPage):
     name: str = Field(description="shown to the others; cleaned and cut; empty: none")
 
 
+MOST_AROUND, MOST_DOWN = 72, 36
+"""Bins of a sphere in the scene: five degrees each. Finer ones are too small to be clicked."""
+
+MOST_PROPOSED = 500
+"""Cameras of a tour in the scene."""
+
+
+class CoverageSightJson(_FromPage):
+    """A sphere round a box: how many views there are of it from each direction."""
+
+    box_id: Id
+    whole_class: bool = Field(description="count views of all objects of the box's class")
+    azimuth_bins: int = Field(ge=1, le=MOST_AROUND)
+    polar_bins: int = Field(ge=1, le=MOST_DOWN)
+    min_visible: float = Field(ge=0, le=1, allow_inf_nan=False, description="of an object, for a view to count")
+    chosen_bin: Id | None = Field(None, description="outlined: azimuth bin * polar bins + polar bin")
+    chosen_cell: Id | None = Field(None, description="or a cell of equal area")
+
+    @model_validator(mode="after")
+    def _chosen_is_there(self) -> "CoverageSightJson":
+        count = self.azimuth_bins * self.polar_bins
+        for name, chosen in (("chosen_bin", self.chosen_bin), ("chosen_cell", self.chosen_cell)):
+            if chosen is not None and chosen >= count:
+                raise ValueError(f"{name} must be below {count}, the number of bins")
+        return self
+
+    @property
+    def sight(self) -> CoverageSight:
+        """As the scene takes it."""
+        return CoverageSight(
+            box_id=self.box_id,
+            whole_class=self.whole_class,
+            azimuth_bins=self.azimuth_bins,
+            polar_bins=self.polar_bins,
+            min_visible=self.min_visible,
+            chosen_bin=self.chosen_bin,
+            chosen_cell=self.chosen_cell,
+        )
+
+
 class ViewMessage(_FromPage):
     """What the page wants its scene to show, whole each time."""
 
@@ -65,6 +108,10 @@ class ViewMessage(_FromPage):
     upright: bool
     hidden: frozenset[Id] = Field(description="boxes that this page does not show")
     dark: bool
+    coverage: CoverageSightJson | None = Field(None, description="a sphere in the scene; null: none")
+    tour: tuple[TransformJson, ...] = Field(
+        (), max_length=MOST_PROPOSED, description="T_world_camera of cameras proposed next, in their order"
+    )
 
     @property
     def state(self) -> ViewState:
@@ -80,6 +127,8 @@ class ViewMessage(_FromPage):
             upright=self.upright,
             hidden=self.hidden,
             dark=self.dark,
+            coverage=None if self.coverage is None else self.coverage.sight,
+            tour=tuple(ProposedCamera(place.position, place.wxyz) for place in self.tour),
         )
 
 
@@ -238,6 +287,14 @@ class PickedMessage(_ToPage):
     frame: int | None
 
 
+class DirectionPickedMessage(_ToPage):
+    """The coverage's sphere was clicked; the direction is folded by the object's symmetry."""
+
+    type: Literal["direction"] = "direction"
+    bin: int = Field(description="of equal angles: azimuth bin * polar bins + polar bin")
+    cell: int = Field(description="of equal area")
+
+
 class EnteredMessage(_ToPage):
     """The scene has been told all of a frame."""
 
@@ -288,7 +345,9 @@ class RefusedMessage(_ToPage):
 
 
 SessionMessage = ReadyMessage | ResetMessage | EditMessage | GoneMessage
-ViewEventMessage = PickedMessage | EnteredMessage | DraggedMessage | ConflictedMessage | RefusedMessage
+ViewEventMessage = (
+    PickedMessage | DirectionPickedMessage | EnteredMessage | DraggedMessage | ConflictedMessage | RefusedMessage
+)
 ServerMessage = SessionMessage | HereMessage | ViewEventMessage
 
 
@@ -301,6 +360,8 @@ def view_event_message(event: ViewEvent) -> ViewEventMessage:
     match event:
         case Picked():
             return PickedMessage(box_id=event.box_id, frame=event.frame)
+        case DirectionPicked():
+            return DirectionPickedMessage(bin=event.bin, cell=event.cell)
         case Entered():
             return EnteredMessage(frame=event.frame, milliseconds=event.milliseconds)
         case Dragged():

@@ -5,7 +5,7 @@ from typing import Any, Literal, cast
 
 from ars_web.datasets.options import ExportOptions
 
-OptionType = Literal["integer", "number", "choice", "integers", "texts"]
+OptionType = Literal["integer", "number", "choice", "integers", "texts", "range"]
 
 _TYPES: dict[tuple[str, str], OptionType] = {
     ("integer", ""): "integer",
@@ -13,6 +13,7 @@ _TYPES: dict[tuple[str, str], OptionType] = {
     ("string", ""): "choice",
     ("array", "integer"): "integers",
     ("array", "string"): "texts",
+    ("array", ""): "range",
 }
 
 
@@ -32,7 +33,7 @@ class ExportOption:
         name: as in the options' JSON, with dots: `split.train` is `{"split": {"train": ...}}`.
         title: its name for people.
         meaning: one line for people.
-        type: of its value; `integers` and `texts` are lists.
+        type: of its value; `integers` and `texts` are lists, a `range` is two numbers, from and to.
         optional: whether it may be null, which then is its default, and is none of the choices.
         choices: of a `choice`; empty for others.
         default: its value where nobody says, or the choice that means the same.

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Int
 
-from ars_web.datasets import splits
 from ars_web.datasets.file_names import stems
+from ars_web.datasets.frame_choosing import choose_frames, split_of_frames
 from ars_web.datasets.image_stamps import stamps_now
-from ars_web.datasets.options import ExportOptions, FrameChoice
+from ars_web.datasets.options import ExportOptions
 from ars_web.datasets.planned import SECONDS_PER_FRAME, ExportPlan, PlannedClass, PlannedFrames, PlannedSession
 from ars_web.datasets.registry import writer_of
 from ars_web.datasets.shapes import check_shape, meshes_of, shape_kinds
@@ -54,14 +54,8 @@ def plan_export(
     check_shape(options.shape, snapshots)
     options = options.model_copy(update={"sessions": tuple(s.id for s in snapshots[1:])})
     out = usable_out(out)
-    chosen = [_chosen(options.frames, snapshot) for snapshot in snapshots]
+    chosen, choice = choose_frames(snapshots, options)
     counts = [len(indices) for indices in chosen]
-    if sum(counts) == 0:
-        raise BadInput(
-            "no frame is chosen: the sessions have "
-            + ", ".join(f"{len(s.frames)} ({s.id})" for s in snapshots)
-            + " frames; widen the choice of frames"
-        )
     classes = merged_classes(snapshots)
     class_names = [a_class.name for a_class in classes]
     sessions = tuple(_planned_session(snapshot, class_names, options.shape) for snapshot in snapshots)
@@ -75,7 +69,7 @@ def plan_export(
         session=np.repeat(np.arange(len(snapshots)), counts),
         index=np.concatenate(chosen),
         camera_id=np.concatenate([s.frames.camera_ids[i] for s, i in zip(snapshots, chosen, strict=True)]),
-        split=splits.assign(counts, options.split),
+        split=split_of_frames(snapshots, chosen, options.split),
         Ts_world_camera=np.concatenate([s.frames.Ts_world_camera[i] for s, i in zip(snapshots, chosen, strict=True)]),
         stamps=np.zeros((len(picked), 2), dtype=np.int64) if options.images == "none" else _stamps(sources),
         names=tuple(snapshots[number].frames.names[i] for number, i in picked),
@@ -88,7 +82,7 @@ def plan_export(
     most_boxes = max(len(session.boxes) for session in sessions)
     cost = SECONDS_PER_FRAME[options.images] + writer.seconds_per_frame(options)
     length = frames_per_shard or _frames_per_shard(len(frames), most_boxes, cost)
-    plan = ExportPlan(out, format, options, classes, sessions, frames, _shards(counts, length), cost)
+    plan = ExportPlan(out, format, options, classes, sessions, frames, _shards(counts, length), cost, choice)
     # A format that can hold nothing useful of it, or not be written here, says so now and not when all is done.
     writer.losses(plan)
     return plan
@@ -141,17 +135,6 @@ def usable_out(out: Path) -> Path:
     if not out.name:
         raise BadInput(f"{out} cannot hold a dataset; name a folder that is not there yet")
     return out
-
-
-def _chosen(choice: FrameChoice, snapshot: SessionSnapshot) -> Int[np.ndarray, "n"]:
-    """The indices that the choice means in this session, ascending."""
-    count = len(snapshot.frames)
-    if choice.list is None:
-        return np.arange(choice.start, min(count, choice.stop if choice.stop is not None else count), choice.step)
-    beyond = [i for i in choice.list if i >= count]
-    if beyond:
-        raise BadInput(f"frame {beyond[0]} is listed, but session {snapshot.id} has {count} frames, from 0")
-    return np.array(sorted(set(choice.list)), dtype=np.int64)
 
 
 def _planned_session(snapshot: SessionSnapshot, class_names: Sequence[str], shape: str | None) -> PlannedSession:

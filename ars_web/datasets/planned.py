@@ -86,6 +86,33 @@ class PlannedFrames:
         return len(self.names)
 
 
+@dataclass(frozen=True)
+class ChoiceMade:
+    """How frames were chosen, where more than their place in the recording decided.
+
+    A direction is an object seen from one of the cells of equal area round it, where it gets a label.
+
+    Attributes:
+        candidates: frames of the range or the list.
+        outside_sector: candidates that stand outside the sector.
+        near_twins: of the others, those left out because they are near twins of a chosen frame.
+        asked: how many were asked for; None: all that are left.
+        chosen: how many were chosen.
+        directions_of_candidates: how many directions all candidates show.
+        directions: how many the chosen frames show.
+        directions_evenly: how many as many evenly spaced frames would, of those that the sector and near twins leave.
+    """
+
+    candidates: int
+    outside_sector: int
+    near_twins: int
+    asked: int | None
+    chosen: int
+    directions_of_candidates: int
+    directions: int
+    directions_evenly: int
+
+
 @dataclass(frozen=True, eq=False)
 class ExportPlan:
     """An export, decided.
@@ -95,6 +122,7 @@ class ExportPlan:
         classes: of the dataset, a class's id being its place: those of the sessions, merged by name in order.
         shards: ranges of frames, each within one session.
         seconds_per_frame: rough work on one core.
+        choice: how its frames were chosen; None: by their place alone, or before the plan was read from a disk.
     """
 
     out: Path
@@ -105,6 +133,7 @@ class ExportPlan:
     frames: PlannedFrames
     shards: tuple[tuple[int, int], ...]
     seconds_per_frame: float
+    choice: ChoiceMade | None = None
 
     @property
     def class_names(self) -> tuple[str, ...]:

@@ -1,6 +1,6 @@
 """Previews: a few frames with their labels drawn, because people would rather look."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import cv2
@@ -87,12 +87,18 @@ def spread(indices: Sequence[int], count: int) -> list[int]:
     return [indices[(2 * i + 1) * len(indices) // (2 * count)] for i in range(count)]
 
 
-def draw_frame(snapshot: SessionSnapshot, index: int, *, shape: str | None = None) -> UInt8[np.ndarray, "h w 3"]:
-    """The frame's image (BGR, enlarged where it is small) with outlines, edges, boxes, names and shares visible."""
+def draw_frame(
+    snapshot: SessionSnapshot, index: int, *, shape: str | None = None, only: Collection[int] | None = None
+) -> UInt8[np.ndarray, "h w 3"]:
+    """The frame's image (BGR, enlarged where it is small) with outlines, edges, boxes, names and shares visible.
+
+    `only` the boxes of these ids are drawn; None: all.
+    """
     if not 0 <= index < len(snapshot.frames):
         raise NotFound(f"session {snapshot.id} has no frame {index}; its frames are 0 to {len(snapshot.frames) - 1}")
     canvas = Canvas(read_image(local(snapshot.frames.images[index])))
-    labels = [label for label in frame_labels(snapshot, index, shape=shape) if label.bbox is not None]
+    seen = (label for label in frame_labels(snapshot, index, shape=shape) if label.bbox is not None)
+    labels = [label for label in seen if only is None or label.box_id in only]
     # Far boxes first: near ones are drawn over them, as they are seen.
     labels.sort(key=lambda label: -_distance(snapshot, index, label))
     colors = {label.box_id: color_of(snapshot.state.classes[label.class_id].color) for label in labels}

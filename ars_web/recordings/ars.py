@@ -27,8 +27,8 @@ TITLE = "ARS scene folder"
 NEEDS = "images/, robot_poses.txt, camera_extrinsics.txt, camera_intrinsics.txt"
 
 POSE_NAMES = "x y z qx qy qz qw"
+EXTRINSICS_FILE = "camera_extrinsics.txt"
 _POSES_FILE = "robot_poses.txt"
-_EXTRINSICS_FILE = "camera_extrinsics.txt"
 
 
 def recognises(path: Path) -> bool:
@@ -54,7 +54,7 @@ def read(path: Path, options: ReadOptions) -> Recording:
             f"has {len(rows.values)} poses for {len(images)} images in {images[0].parent}{uncounted(images)};"
             " which pose is whose cannot be known",
         )
-    T_wrist_camera = _camera_in_wrist(options.allowed(path / _EXTRINSICS_FILE))
+    T_wrist_camera = camera_in_wrist(options.allowed(path / EXTRINSICS_FILE))
     cameras = {0: read_camera_file(options.allowed(options.camera or path / CAMERA_FILE))}
     listed = [ListedFrame(None, image, 0, rows.where(i)) for i, image in enumerate(images)]
     poses = poses_from_wrist(rows.values, T_wrist_camera)
@@ -68,7 +68,12 @@ def poses_from_wrist(wrist_xyz_xyzw: Float[np.ndarray, "n 7"], T_wrist_camera: T
     return CheckedPoses(wrist.Ts @ T_wrist_camera, wrist.problems)
 
 
-def _camera_in_wrist(path: Path) -> Transform:
+def camera_in_wrist(path: Path) -> Transform:
+    """`T_wrist_camera` of a file of seven numbers, in one line or one a line.
+
+    Raises:
+        BadFile: it is missing or damaged.
+    """
     # numpy.savetxt writes a vector one number a line, and the original tool reads that too.
     rows = read_rows(path, columns={7: POSE_NAMES, 1: "one a line"})
     if rows.values.size != 7:

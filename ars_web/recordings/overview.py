@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from ars_web.geometry.camera import Camera
 from ars_web.recordings.recording import Recording
@@ -52,23 +52,33 @@ def overview(recording: Recording) -> Overview:
     """Look a recording over."""
     count = len(recording.frames)
     ids = np.array([frame.camera_id for frame in recording.frames])
-    positions = recording.Ts_world_camera[:, :3, 3]
-    paths = {id_: positions[ids == id_] for id_ in recording.cameras}
-    cameras = tuple(CameraUse(id_, camera, len(paths[id_])) for id_, camera in recording.cameras.items())
-    path_length = max((float(_steps(path).sum()) for path in paths.values()), default=0.0)
+    centres = recording.Ts_world_camera[:, :3, 3]
+    went = path_length(centres, ids)
     return Overview(
-        cameras=cameras,
-        path_length=path_length,
+        cameras=tuple(CameraUse(i, camera, int((ids == i).sum())) for i, camera in recording.cameras.items()),
+        path_length=went,
         sample_frames=tuple(np.unique(np.linspace(0, count - 1, min(SAMPLES, count)).round().astype(int)).tolist()),
-        warnings=tuple(_warnings(recording, path_length, [np.flatnonzero(ids == id_) for id_ in recording.cameras])),
+        warnings=tuple(_warnings(recording, went, centres, ids)),
     )
+
+
+def path_length(centres_world: Float[np.ndarray, "n 3"], camera_ids: Int[np.ndarray, "n"]) -> float:
+    """Metres that the camera went from frame to frame; of several the one that went farthest."""
+    return max((float(_steps(centres_world[camera_ids == i]).sum()) for i in np.unique(camera_ids)), default=0.0)
+
+
+def jumps(centres_world: Float[np.ndarray, "n 3"], camera_ids: Int[np.ndarray, "n"]) -> list[str]:
+    """Where a camera went far more in one step than in its others, in words: tracking may have been lost there."""
+    return [line for i in np.unique(camera_ids) for line in _jumps(centres_world, np.flatnonzero(camera_ids == i))]
 
 
 def _steps(path: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, " m"]:
     return np.linalg.norm(np.diff(path, axis=0), axis=1)
 
 
-def _warnings(recording: Recording, path_length: float, of_cameras: list[np.ndarray]) -> list[str]:
+def _warnings(
+    recording: Recording, went: float, centres_world: Float[np.ndarray, "n 3"], camera_ids: Int[np.ndarray, "n"]
+) -> list[str]:
     found: list[str] = []
     used, skipped = len(recording.frames), len(recording.skipped)
     if skipped > _MANY_SKIPPED * (used + skipped):
@@ -77,18 +87,15 @@ def _warnings(recording: Recording, path_length: float, of_cameras: list[np.ndar
         found.append(
             "lengths are the model's own, which need not be metres: compare the size of something known in the scene"
         )
-    elif used > 1 and path_length < STILL:
+    elif used > 1 and went < STILL:
         found.append("the camera stands still, so boxes cannot be placed in depth: were the poses recorded?")
-    for frames in of_cameras:
-        found += _jumps(recording, frames)
-    return found
+    return found + jumps(centres_world, camera_ids)
 
 
-def _jumps(recording: Recording, frames: np.ndarray) -> list[str]:
-    """Steps far longer than a camera's others: where tracking may have been lost."""
+def _jumps(centres_world: Float[np.ndarray, "n 3"], frames: Int[np.ndarray, " m"]) -> list[str]:
     if len(frames) < 3:
         return []
-    path = recording.Ts_world_camera[frames, :3, 3]
+    path = centres_world[frames]
     steps = _steps(path)
     extent = float(np.linalg.norm(path.max(axis=0) - path.min(axis=0)))
     far = np.flatnonzero((steps > _JUMP_IN_STEPS * np.median(steps)) & (steps > _JUMP_IN_EXTENT * extent))

@@ -21,6 +21,7 @@ from ars_web.errors import BadFile, BadInput
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box
 from ars_web.geometry.camera import Camera
+from ars_web.geometry.rigid_transform import Transform
 from ars_web.recordings.ars import POSE_NAMES, poses_from_wrist
 from ars_web.recordings.frames import ListedFrame, usable_frames
 from ars_web.recordings.intrinsics import camera_from
@@ -99,16 +100,27 @@ def read(path: Path, options: ReadOptions) -> Recording:
             f"has {len(manifest.robot_poses)} robot_poses for {len(names)} images; which pose is whose cannot be known",
         )
     wrist = _rows_of_seven(file, manifest.robot_poses, "robot_poses")
-    mounted = poses_from_wrist(_rows_of_seven(file, [manifest.robot_to_camera_pose], "robot_to_camera_pose"), np.eye(4))
-    if mounted.problems:
-        raise BadFile(file, f"robot_to_camera_pose: {mounted.problems[0]}")
+    T_wrist_camera = _camera_in_wrist(file, manifest)
     cameras = {0: _camera(file, manifest.camera_params)}
     folder = _image_folder(file, manifest, options)
     listed = [ListedFrame(None, folder / name, 0, str(file)) for name in names]
-    poses = poses_from_wrist(wrist, mounted.Ts[0])
+    poses = poses_from_wrist(wrist, T_wrist_camera)
     frames, skipped = usable_frames(file, listed, poses, cameras, options)
     class_names, boxes, unclassed = _boxes(file, manifest.classes)
     return Recording("roars", path.resolve(), cameras, frames, skipped + unclassed, class_names, boxes)
+
+
+def camera_in_wrist(path: Path, options: ReadOptions) -> Transform:
+    """`T_wrist_camera` of a manifest, or of the only one in a folder; raises as `read`."""
+    file = options.allowed(_file(path))
+    return _camera_in_wrist(file, parse_json(file, file_bytes(file), _Manifest))
+
+
+def _camera_in_wrist(file: Path, manifest: _Manifest) -> Transform:
+    mounted = poses_from_wrist(_rows_of_seven(file, [manifest.robot_to_camera_pose], "robot_to_camera_pose"), np.eye(4))
+    if mounted.problems:
+        raise BadFile(file, f"robot_to_camera_pose: {mounted.problems[0]}")
+    return mounted.Ts[0]
 
 
 def _manifests(folder: Path) -> list[Path]:

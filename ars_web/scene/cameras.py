@@ -38,7 +38,7 @@ CURRENT_COLOR = (74, 168, 255)
 CAMERAS = "/cameras"
 """The node that holds all that is shared of cameras."""
 
-_EDGES = np.array([(0, 1), (0, 2), (0, 3), (0, 4), (1, 2), (2, 3), (3, 4), (4, 1)])
+FRUSTUM_EDGES = np.array([(0, 1), (0, 2), (0, 3), (0, 4), (1, 2), (2, 3), (3, 4), (4, 1)])
 
 
 def frustum_corners(camera: Camera, *, depth: float) -> Float[np.ndarray, "5 3"]:
@@ -68,7 +68,7 @@ def frustum_lines(
     corners = {key: frustum_corners(camera, depth=depth) for key, camera in _used(frames, cameras, indices).items()}
     own = np.array([corners[int(frames.camera_ids[i])] for i in indices]).reshape(-1, 5, 3)
     world = rigid_transform.transform_points(frames.Ts_world_camera[indices], own)
-    return world[:, _EDGES].reshape(-1, 2, 3)
+    return world[:, FRUSTUM_EDGES].reshape(-1, 2, 3)
 
 
 def _used(frames: FrameTable, cameras: Mapping[int, Camera], indices: Int[np.ndarray, "k"]) -> dict[int, Camera]:
@@ -148,7 +148,7 @@ class CurrentCamera:
         T_world_camera = self._frames.Ts_world_camera[frame]
         camera = self._cameras[int(self._frames.camera_ids[frame])]
         corners = frustum_corners(camera, depth=self._depth)
-        own = corners[_EDGES].astype(np.float32)
+        own = corners[FRUSTUM_EDGES].astype(np.float32)
         around = np.arange(max(0, frame - NEIGHBOURS), min(len(self._frames), frame + NEIGHBOURS + 1))
         lines = frustum_lines(self._frames, self._cameras, around[around != frame], depth=self._neighbour_depth)
         near = rigid_transform.transform_points(rigid_transform.invert(T_world_camera), lines).astype(np.float32)

@@ -13,6 +13,7 @@ from ars_web.errors import ArsError, BadInput, NotFound, StoreError
 from ars_web.sessions.editing import SessionEditor
 from ars_web.sessions.edits import Edit
 from ars_web.sessions.store import SessionStore
+from ars_web.studies.kept_views import KeptViews
 from ars_web.workspace import BoxPreview, NewBox, SceneAddress, ScenePage, ViewAction, ViewEvent, ViewState
 
 if TYPE_CHECKING:  # viser takes a third of a second to import, which programs that show no scene need not wait for
@@ -56,11 +57,22 @@ class SceneServers:
     """
 
     def __init__(
-        self, store: SessionStore, editor: SessionEditor, *, idle_seconds: float = 60.0, poll_seconds: float = 0.5
+        self,
+        store: SessionStore,
+        editor: SessionEditor,
+        *,
+        kept_views: KeptViews | None = None,
+        idle_seconds: float = 60.0,
+        poll_seconds: float = 0.5,
     ) -> None:
+        """
+        Args:
+            kept_views: where what spheres count is kept; by default the scenes' own.
+        """
         self.idle_seconds = idle_seconds
         self._store = store
         self._editor = editor
+        self._kept_views = KeptViews() if kept_views is None else kept_views
         self._poll_seconds = poll_seconds
         self._lock = threading.Lock()
         self._open: dict[str, _Open] = {}
@@ -218,7 +230,9 @@ class SceneServers:
     def _make(self, sid: str) -> "SessionScene":
         from ars_web.scene.session_scene import SessionScene
 
-        return SessionScene(sid, store=self._store, editor=self._editor, workers=self._workers)
+        return SessionScene(
+            sid, store=self._store, editor=self._editor, workers=self._workers, kept_views=self._kept_views
+        )
 
     def _forget(self, sid: str, entry: _Open) -> None:
         entry.closed = True

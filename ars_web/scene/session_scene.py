@@ -17,6 +17,7 @@ import viser
 
 from ars_web.errors import ArsError, NotFound
 from ars_web.geometry.rigid_transform import Transform
+from ars_web.geometry.sphere_bins import SphereBins
 from ars_web.scene import hardening
 from ars_web.scene.boxes import BoxNodes
 from ars_web.scene.cameras import add_cameras
@@ -31,7 +32,19 @@ from ars_web.scene.views import ClientView, Page, Surroundings
 from ars_web.sessions.editing import SessionEditor
 from ars_web.sessions.model import VirtualBox
 from ars_web.sessions.store import SessionStore
-from ars_web.workspace import BoxPreview, Dragged, NewBox, Picked, Refused, ViewAction, ViewEvent, ViewState
+from ars_web.studies.kept_views import KeptViews
+from ars_web.studies.sphere_counts import SphereCounts, sphere_counts
+from ars_web.workspace import (
+    BoxPreview,
+    CoverageSight,
+    Dragged,
+    NewBox,
+    Picked,
+    Refused,
+    ViewAction,
+    ViewEvent,
+    ViewState,
+)
 
 log = logging.getLogger(__name__)
 
@@ -41,10 +54,13 @@ CLOSING_SECONDS = 5.0
 class SessionScene:
     """One session's scene, served on loopback from the moment it is made until `close`. Thread-safe."""
 
-    def __init__(self, sid: str, *, store: SessionStore, editor: SessionEditor, workers: Executor) -> None:
+    def __init__(
+        self, sid: str, *, store: SessionStore, editor: SessionEditor, workers: Executor, kept_views: KeptViews
+    ) -> None:
         """
         Args:
             workers: for what may block.
+            kept_views: of all sessions, shared with the API.
 
         Raises:
             NotFound: there is no such session.
@@ -53,6 +69,7 @@ class SessionScene:
         self._store = store
         self._edits = editor
         self._workers = workers
+        self._kept_views = kept_views
         self._pages: dict[str, Page] = {}
         self._states: dict[str, ViewState] = {}
         self._clients: dict[int, ClientView] = {}
@@ -72,6 +89,7 @@ class SessionScene:
             photos=Photos(recording.cameras, recording.frames),
             workers=workers,
             tell=self._tell,
+            coverage=self._coverage,
         )
         self._loop = self.server.get_event_loop()
         try:
@@ -185,6 +203,17 @@ class SessionScene:
             author=author,
         )
 
+    def _coverage(self, sight: CoverageSight) -> SphereCounts:
+        """What a sphere shows of the session as it is now; on a worker."""
+        return sphere_counts(
+            self._store.snapshot(self._around.recording.id),
+            self._kept_views,
+            SphereBins(sight.azimuth_bins, sight.polar_bins),
+            box_id=sight.box_id,
+            whole_class=sight.whole_class,
+            min_visible=sight.min_visible,
+        )
+
     def _add_box(self, view: ClientView, sight: Sight, class_id: int) -> None:
         """Add a box where the view looks, and let its page select it; on a worker."""
         around, sid = self._around, self._around.recording.id
@@ -275,6 +304,8 @@ class SessionScene:
                 self._meshes.know(now.meshes)
                 self._around.boxes.show(now.state)
                 self._revision = now.state.revision
+                for view in tuple(self._clients.values()):
+                    view.edited()
         except ArsError as error:  # deleted, or the disk is full: those who ask for the session are told
             log.info("session %s: %s", self._around.recording.id, error)
         finally:

@@ -14,6 +14,7 @@ from ars_web.errors import ArsError
 from ars_web.scene.box_editor import BoxEditor, Commit
 from ars_web.scene.boxes import BoxNodes, OwnBoxes
 from ars_web.scene.cameras import CAMERAS, CurrentCamera, frustum_photo
+from ars_web.scene.coverage_sphere import CoverageSphere, Read
 from ars_web.scene.extent import FIELD_OF_VIEW, Extent, Viewpoint, behind_camera, close_up, free_lens, overview
 from ars_web.scene.frame_view import FrameView
 from ars_web.scene.ground import AXES, GROUND
@@ -22,8 +23,9 @@ from ars_web.scene.photos import Photos
 from ars_web.scene.picking import Ray, box_hit, camera_hit
 from ars_web.scene.placing import Sight, frame_sight, free_sight
 from ars_web.scene.shared_nodes import SharedNodes
+from ars_web.scene.tour_path import TourPath
 from ars_web.sessions.model import SessionSnapshot
-from ars_web.workspace import Look, Picked, Refused, ViewAction, ViewEvent, ViewState
+from ars_web.workspace import DirectionPicked, Look, Picked, Refused, ViewAction, ViewEvent, ViewState
 
 log = logging.getLogger(__name__)
 
@@ -52,6 +54,7 @@ class Surroundings:
         workers: for what would hold up the event loop.
         tell: says what happens in a visitor's view to the page of it, and of drags to the others' as well; for any
             thread.
+        coverage: counts what a sphere shows; it blocks.
     """
 
     recording: SessionSnapshot
@@ -60,6 +63,7 @@ class Surroundings:
     photos: Photos
     workers: Executor
     tell: Callable[[Visitor, ViewEvent], None]
+    coverage: Read
 
     @property
     def centres(self) -> Float[np.ndarray, "n 3"]:
@@ -91,6 +95,11 @@ class ClientView:
         self._camera = CurrentCamera(client, recording.frames, recording.cameras, surroundings.extent)
         self._shared = SharedNodes(client, (CAMERAS, GROUND, AXES))
         self._boxes = OwnBoxes(client, surroundings.boxes)
+        self._sphere = CoverageSphere(
+            client, surroundings.boxes, read=surroundings.coverage, workers=surroundings.workers
+        )
+        first = recording.cameras[int(recording.frames.camera_ids[0])]
+        self._tour = TourPath(client, first, surroundings.extent)
         self._editor = BoxEditor(
             client,
             surroundings.boxes,
@@ -132,7 +141,9 @@ class ClientView:
                 self._frame.enter(state.frame)
         except ArsError as error:
             self.tell(Refused(str(error)))
+        self._sphere.show(None if in_frame else state.coverage, dark=state.dark)
         with self.client.atomic():
+            self._tour.show(() if in_frame else state.tour, dark=state.dark)
             self._shared.show(not in_frame)
             if in_frame:
                 self._camera.hide()
@@ -146,6 +157,10 @@ class ClientView:
             return
         if isinstance(action, Look):
             self._look(action)
+
+    def edited(self) -> None:
+        """The session may be another than before."""
+        self._sphere.edited()
 
     def sight(self) -> Sight:
         """What this view looks along."""
@@ -164,7 +179,10 @@ class ClientView:
         boxes = {box_id: box for box_id, box in self._around.boxes.drawn().items() if box_id not in state.hidden}
         box = box_hit(ray, boxes)
         camera = None if state.mode == "frame" else camera_hit(ray, self._around.centres)
-        if camera is not None and (box is None or camera.distance < box.distance):
+        sphere = None if state.mode == "frame" else self._sphere.meets(ray)
+        if sphere is not None and all(hit is None or sphere.distance < hit.distance for hit in (box, camera)):
+            self.tell(DirectionPicked(sphere.bin, sphere.cell))
+        elif camera is not None and (box is None or camera.distance < box.distance):
             self.tell(Picked(frame=camera.key))
         else:
             self.tell(Picked(box_id=None if box is None else box.key))
@@ -183,10 +201,11 @@ class ClientView:
         self._editor.close()
         self._frame.close()
         self._boxes.close()
-        if self._thumbnail is None:
-            return []
-        self._thumbnail.cancel()
-        return [self._thumbnail]
+        tasks = self._sphere.close()
+        if self._thumbnail is not None:
+            self._thumbnail.cancel()
+            tasks.append(self._thumbnail)
+        return tasks
 
     def _look(self, look: Look) -> None:
         viewpoint = self._viewpoint(look)

@@ -10,6 +10,7 @@
  * What it hears, from the page around it alone:
  *   {ars: "view", mode: "scene" | "frame", blend, dark}         blend: 0 no photo, 1 the photo as it is
  *   {ars: "names", boxes: [{id, name, color}]}                  written over the boxes; color: #rrggbb
+ *   {ars: "numbers", at: [[x, y, z]]}                           1, 2, … written at points of the world
  *   {ars: "fit"}                                                zoom 1, as a double-click does here
  *   {ars: "zoom", by}                                           times that about the middle
  *   {ars: "show", box}                                          zoom to the box of this id, and stay with it from frame
@@ -45,6 +46,8 @@
    *
    * @typedef {object} Material
    * @property {number} opacity
+   * @property {boolean} toneMapped
+   * @property {boolean} needsUpdate
    * @property {boolean} colorWrite
    * @property {boolean} depthWrite
    *
@@ -74,6 +77,7 @@
   const PATIENCE = 30_000;
   const LARGEST_ZOOM = 20;
   const STILL = 4; // CSS pixels that a press may move and be a click
+  const SPHERE = "/coverage/sphere"; // as in scene/coverage_sphere.py
   const PHOTO = "/photo"; // as in scene/frame_view.py
   /** Of a box: a cube of side 1 in its own coordinates. @param {number} id */
   const edgesOf = (id) => `/boxes/${id}/at/edges`; // as in scene/boxes.py
@@ -116,6 +120,7 @@
     if (told.ars === "fit") fit();
     if (told.ars === "zoom" && Number.isFinite(told.by) && told.by > 0) zoomAboutMiddle(told.by);
     if (told.ars === "show" && Number.isInteger(told.box) && view.mode === "frame") follows = { box: told.box, from: "" };
+    if (told.ars === "numbers" && Array.isArray(told.at)) numberPoints(told.at);
     if (told.ars === "names" && Array.isArray(told.boxes)) nameBoxes(told.boxes);
     if (told.ars !== "view") return;
     if (told.mode === "scene" || told.mode === "frame") view.mode = told.mode;
@@ -364,6 +369,16 @@
     });
   }
 
+  /** Colours that mean numbers are shown as they are, not as a film would. @param {Viser} viser */
+  function showTrueColours(viser) {
+    viser.nodeRefFromName[SPHERE]?.traverse(({ material }) => {
+      if (material === undefined || !material.toneMapped) return;
+      material.toneMapped = false;
+      material.needsUpdate = true;
+      viser.requestRender();
+    });
+  }
+
   /** @type {Map<string, HTMLElement>} */
   const dots = new Map();
 
@@ -465,6 +480,42 @@
     }
   }
 
+  /** What is written at points of the world: each its place in a list, from 1. @type {{point: [number, number, number], chip: HTMLElement}[]} */
+  let numbers = [];
+
+  /** @param {any[]} points */
+  function numberPoints(points) {
+    for (const { chip } of numbers) chip.remove();
+    numbers = points
+      .filter((point) => Array.isArray(point) && point.length === 3 && point.every(Number.isFinite))
+      .map((point, i) => {
+        const chip = hiddenOver("ars-number");
+        chip.textContent = String(i + 1);
+        document.body.append(chip);
+        return { point, chip };
+      });
+  }
+
+  /** @param {Viser} viser */
+  function placeNumbers(viser) {
+    const { camera, canvas, nodeRefFromName } = viser;
+    const root = nodeRefFromName[""];
+    if (numbers.length === 0 || root == null) return;
+    const { x: left, y: top, width, height } = canvas.getBoundingClientRect();
+    root.updateWorldMatrix(true, false);
+    camera.updateWorldMatrix(true, false);
+    for (const { point, chip } of numbers) {
+      const eye = camera.position.clone().set(...point).applyMatrix4(root.matrixWorld).applyMatrix4(camera.matrixWorldInverse);
+      const ahead = eye.z < 0;
+      const at = eye.applyMatrix4(camera.projectionMatrix);
+      const shown = ahead && view.mode === "scene" && Math.abs(at.x) < 1 && Math.abs(at.y) < 1;
+      if (chip.hidden === shown) chip.hidden = !shown;
+      if (!shown) continue;
+      const [x, y] = [left + ((at.x + 1) / 2) * width, top + ((1 - at.y) / 2) * height];
+      chip.style.transform = `translate(-50%, -50%) translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
+    }
+  }
+
   const begun = performance.now();
   let announced = false;
   let complained = false;
@@ -486,6 +537,8 @@
     fade(viser);
     dress(viser);
     placeNames(viser);
+    placeNumbers(viser);
+    showTrueColours(viser);
     if (pointer !== null) {
       tell({ ars: "pointer", ...pointer });
       pointer = null;

@@ -123,7 +123,8 @@ export const commands = [
   { id: "mode-scene", title: "Scene", group: "View", keys: ["1"], run: () => goMode("scene") },
   { id: "mode-frame", title: "Frame", group: "View", keys: ["2"], run: () => actions.enterFrame() },
   { id: "mode-masks", title: "Masks", group: "View", keys: ["3"], run: () => goMode("masks") },
-  { id: "mode-export", title: "Export", group: "View", keys: ["4"], run: () => goMode("export") },
+  { id: "mode-coverage", title: "Coverage", group: "View", keys: ["4"], run: () => goMode("coverage") },
+  { id: "mode-export", title: "Export", group: "View", keys: ["5"], run: () => goMode("export") },
   {
     id: "toggle-frame",
     title: "Enter or leave the current frame",
@@ -274,10 +275,17 @@ function stepBox(step) {
   actions.select(ids[(at + step + (at < 0 && step < 0 ? 1 : 0) + ids.length) % ids.length]);
 }
 
+/** The chosen direction first. */
+function leaveCoverage() {
+  if (store.direction.value !== null) store.direction.value = null;
+  else goMode("scene");
+}
+
 function backOut() {
   if (store.overlay.value !== null) store.overlay.value = null;
   else if (inMasks()) goMode("scene");
   else if (store.tool.value !== "select") store.tool.value = "select";
+  else if (store.mode.value === "coverage") leaveCoverage();
   else if (store.selected.value !== null) store.selected.value = null;
   else if (store.mode.value === "frame") actions.leaveFrame();
   else if (store.mode.value !== "scene") goMode("scene");

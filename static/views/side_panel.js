@@ -8,6 +8,7 @@ import { BoxesList } from "./boxes_list.js";
 import { addingClass, Classes } from "./classes.js";
 import { ConflictCard } from "./conflict_card.js";
 import { HistoryPanel } from "./history_panel.js";
+import { CoveragePanel, CoverageWayOn } from "./coverage/panel.js";
 import { MakeBox, MasksPanel } from "./masks/panel.js";
 import { NewBox } from "./new_box.js";
 import { TellingFrames } from "./telling_frames.js";
@@ -20,18 +21,22 @@ const TABS = /** @type {const} */ ([
 export function SidePanel() {
   const shown = store.sidePanel.value;
   const inMasks = store.mode.value === "masks";
+  const inCoverage = store.mode.value === "coverage";
   return html`<div class="panel-top">
       <${Tabs} />
-      ${shown === "boxes" && (inMasks || store.boxes.value.size > 0) && html`<${NewBox} />`}
+      ${shown === "boxes" && !inCoverage && (inMasks || store.boxes.value.size > 0) && html`<${NewBox} />`}
     </div>
     <${ConflictCard} />
     <div class="panel-body" role="tabpanel" id="panel-body" aria-labelledby=${`tab-${shown}`}>
-      ${shown === "boxes"
+      ${shown === "boxes" && inCoverage
+        ? html`<${CoveragePanel} />`
+        : shown === "boxes"
         ? html`<${BoxesList} />${inMasks ? html`<${MasksPanel} />` : html`<${BoxNumbers} /><${TellingFrames} />`}${(!inMasks || addingClass.value || store.classes.value.size === 0) && html`<${Classes} />`}${!inMasks && html`<${Facts} />`}`
         : html`<${HistoryPanel} />`}
     </div>
     ${inMasks && html`<${MakeBox} />`}
-    ${!inMasks && store.mode.value !== "export" &&
+    ${inCoverage && html`<${CoverageWayOn} />`}
+    ${!inMasks && !inCoverage && store.mode.value !== "export" &&
     html`<div class="panel-foot">
       <button class="button main" onClick=${command("mode-export").run}>Export training set</button>
     </div>`}`;

@@ -10,6 +10,7 @@ import { Hints } from "./hints.js";
 import { asked } from "./photo_sight.js";
 import { MadeBox, PointsTool } from "./points_tool.js";
 import { ExportPanel } from "./export/panel.js";
+import { CoverageDock } from "./coverage/dock.js";
 import { MasksMode } from "./masks/mode.js";
 
 /** @param {{view: string}} props `view`: the name by which the server knows the page's scene */
@@ -26,6 +27,7 @@ export function Stage({ view }) {
         ready.value = true;
         tellBridge();
         tellNames();
+        tellNumbers();
       } else if (told?.ars === "key" && told.type === "keydown") {
         press({ key: told.key, code: told.code, ctrlKey: told.ctrl, metaKey: told.meta, shiftKey: told.shift, altKey: told.alt, repeat: told.repeat });
       } else if (told?.ars === "zoom") store.zoom.value = told.zoom;
@@ -52,6 +54,11 @@ export function Stage({ view }) {
     frame.current?.contentWindow?.postMessage({ ars: "names", boxes }, location.origin);
   };
   useSignalEffect(tellNames);
+  const tellNumbers = () => {
+    const at = store.mode.value === "coverage" ? store.tour.value.map(({ position }) => position) : [];
+    frame.current?.contentWindow?.postMessage({ ars: "numbers", at }, location.origin);
+  };
+  useSignalEffect(tellNumbers);
   useSignalEffect(() => {
     if (asked.value !== null) frame.current?.contentWindow?.postMessage(asked.value, location.origin);
   });
@@ -59,7 +66,8 @@ export function Stage({ view }) {
   const mode = store.mode.value;
   const filled = mode === "export" || mode === "masks" || store.tool.value === "points";
   const isFlat = mode === "frame" && !filled && store.markFunction.value !== "";
-  return html`<main class="stage" aria-label="Scene">
+  const inCoverage = mode === "coverage" && !filled;
+  return html`<main class="stage" aria-label="Scene" data-docked=${inCoverage}>
     <iframe
       ref=${frame} title="3D scene: the tracked cameras and the virtual boxes" inert=${filled || isFlat}
       src=${`/scene/${encodeURIComponent(store.sid.value)}/${view}/?fixedDpr=${fixedRatio()}`}
@@ -67,6 +75,7 @@ export function Stage({ view }) {
     ${!ready.value && !filled && !isFlat && html`<div class="cover" role="status">Opening the scene</div>`}
     ${isFlat && html`<${FlatFrame} />`}
     ${!filled && html`<${Overlays} /><${Hints} />`}
+    ${inCoverage && html`<${CoverageDock} />`}
     ${mode === "export" && html`<div class="filled"><${ExportPanel} /></div>`}
     ${mode === "masks" && html`<div class="filled"><${MasksMode} /></div>`}
     ${mode !== "export" && mode !== "masks" && store.tool.value === "points" && html`<div class="filled"><${PointsTool} /></div>`}
@@ -109,6 +118,8 @@ function Overlays() {
           onInput=${(/** @type {any} */ event) => (store.blend.value = Number(event.currentTarget.value))}
         />
       </label>`}
+      ${store.mode.value === "coverage" && store.selected.value !== null &&
+      html`<button class="chip button" onClick=${command("look-selected").run} title="Look at the selected object (L)">Look closer</button>`}
       <button class="chip button" aria-pressed=${store.snapLength.value > 0 || store.snapAngle.value > 0} onClick=${command("snap").run} title="Snap (N)">
         ${snapWords()}
       </button>

@@ -10,6 +10,7 @@ const MODES = /** @type {const} */ ([
   ["scene", "Scene"],
   ["frame", "Frame"],
   ["masks", "Masks"],
+  ["coverage", "Coverage"],
   ["export", "Export"],
 ]);
 

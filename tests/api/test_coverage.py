@@ -108,3 +108,14 @@ def test_what_is_wrong_is_named(client: httpx.Client, ring: str, ball: int, quer
     assert answer.status_code == status, answer.text[:500]
     assert answer.headers["Content-Type"] == "application/problem+json"
     assert said in answer.text
+
+
+def test_each_object_and_class_is_listed_with_what_is_unseen(client: httpx.Client, ring: str, ball: int) -> None:
+    empty = client.get(f"{ring}/coverage/objects?azimuth_bins=12&polar_bins=6").json()["items"]
+    of_box = read(client, ring, f"box_id={ball}&azimuth_bins=12&polar_bins=6")
+    expected = {"frames": 12, "views": 12, "empty_fraction": of_box["equal_area"]["empty_fraction"]}
+    assert empty == [{"class_id": 0, "box_id": ball, **expected}, {"class_id": 0, "box_id": None, **expected}]
+
+
+def test_without_a_box_no_object_is_listed(client: httpx.Client, ring: str) -> None:
+    assert client.get(f"{ring}/coverage/objects").json() == {"items": []}

@@ -8,10 +8,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ars_web.api.live_models import LiveToPage, PreviewMessage, page_message, view_event_message
+from ars_web.api.live_models import LiveToPage, PreviewMessage, ViewMessage, page_message, view_event_message
 from ars_web.errors import ArsError, BadInput
 from ars_web.geometry.box import Box
-from ars_web.workspace import BoxPreview, Conflicted, Dragged, Entered, Picked, Refused
+from ars_web.workspace import (
+    BoxPreview,
+    Conflicted,
+    CoverageSight,
+    DirectionPicked,
+    Dragged,
+    Entered,
+    Picked,
+    ProposedCamera,
+    Refused,
+)
 
 numbers = st.one_of(
     st.integers(-3, 3),
@@ -29,7 +39,20 @@ places = st.fixed_dictionaries(
 )
 FIELDS: dict[str, list[str]] = {
     "hello": ["name"],
-    "view": ["mode", "frame", "selected", "tool", "axes", "snap_length", "snap_angle", "upright", "hidden", "dark"],
+    "view": [
+        "mode",
+        "frame",
+        "selected",
+        "tool",
+        "axes",
+        "snap_length",
+        "snap_angle",
+        "upright",
+        "hidden",
+        "dark",
+        "coverage",
+        "tour",
+    ],
     "look": ["at"],
     "new-box": ["class_id"],
     "preview": ["box_id", "T_world_box", "size"],
@@ -94,3 +117,51 @@ PREVIEW = BoxPreview(1, Box(np.eye(4), np.ones(3)))
 def test_what_the_server_says_fits_what_it_documents(event: Any) -> None:
     said = view_event_message(event)
     assert LiveToPage.model_validate_json(said.model_dump_json()).root == said
+
+
+VIEW: dict[str, Any] = {
+    "type": "view",
+    "mode": "scene",
+    "frame": 0,
+    "selected": None,
+    "tool": "select",
+    "axes": "box",
+    "snap_length": 0,
+    "snap_angle": 0,
+    "upright": False,
+    "hidden": [],
+    "dark": True,
+}
+
+
+def test_a_view_may_ask_for_a_sphere_and_proposed_cameras() -> None:
+    place = {"position": [1.0, 2.0, 3.0], "wxyz": [1.0, 0.0, 0.0, 0.0]}
+    sphere = {"box_id": 3, "whole_class": True, "azimuth_bins": 18, "polar_bins": 9, "min_visible": 0.5}
+    taken = page_message(json.dumps({**VIEW, "coverage": {**sphere, "chosen_cell": 161}, "tour": [place]}))
+    assert isinstance(taken, ViewMessage)
+    assert taken.state.coverage == CoverageSight(3, True, 18, 9, 0.5, chosen_cell=161)
+    assert taken.state.tour == (ProposedCamera((1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0)),)
+    without = page_message(json.dumps(VIEW))
+    assert isinstance(without, ViewMessage)
+    assert (without.state.coverage, without.state.tour) == (None, ())
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"chosen_cell": 162}, "chosen_cell must be below 162"),
+        ({"chosen_bin": 500}, "chosen_bin must be below 162"),
+        ({"azimuth_bins": 73}, "less than or equal to 72"),
+        ({"min_visible": 1.5}, "less than or equal to 1"),
+        ({"box_id": None}, "coverage.box_id"),
+    ],
+)
+def test_a_sphere_that_cannot_be_is_refused(changes: dict[str, Any], words: str) -> None:
+    sphere = {"box_id": 3, "whole_class": False, "azimuth_bins": 18, "polar_bins": 9, "min_visible": 0, **changes}
+    with pytest.raises(BadInput, match=words):
+        page_message(json.dumps({**VIEW, "coverage": sphere}))
+
+
+def test_a_page_is_told_of_a_direction_that_was_clicked() -> None:
+    told = view_event_message(DirectionPicked(bin=5, cell=7)).model_dump()
+    assert told == {"type": "direction", "bin": 5, "cell": 7}

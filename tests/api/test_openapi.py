@@ -144,6 +144,7 @@ def test_the_live_line_s_messages_are_in_it(document: dict[str, Any]) -> None:
             "entered",
             "dragged",
             "conflicted",
+            "direction",
             "refused",
         },
     }.items():

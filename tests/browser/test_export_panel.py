@@ -16,20 +16,21 @@ from ars_web.geometry.camera import Camera
 from ars_web.recordings.recording import Frame, RecordedBox, Recording
 from ars_web.recordings.registry import read_recording
 from ars_web.sessions.store import SessionStore
+from tests.browser.conftest import Shelf
 
 LONG = 20_000
 
 
 @pytest.fixture
-def plain_session(tmp_path: Path, demo_recording) -> tuple[Path, str]:
+def plain_session(shelf: Shelf, demo_recording) -> tuple[Path, str]:
     """The small demo without boxes."""
-    with SessionStore(tmp_path / "sessions") as store:
+    with SessionStore(shelf.sessions) as store:
         made = store.create(read_recording(demo_recording.folder, format="ars"), name="plain")
-    return tmp_path / "sessions", made.id
+    return shelf.sessions, made.id
 
 
 @pytest.fixture
-def long_session(tmp_path: Path) -> tuple[Path, str]:
+def long_session(shelf: Shelf, tmp_path: Path) -> tuple[Path, str]:
     """A box that a camera at rest sees 20,000 times: exporting it takes seconds."""
     image = tmp_path / "image.jpg"
     cv2.imwrite(str(image), np.full((240, 320, 3), 128, np.uint8))
@@ -38,10 +39,10 @@ def long_session(tmp_path: Path) -> tuple[Path, str]:
     T_world_box = np.eye(4)
     T_world_box[2, 3] = 2.0
     box = RecordedBox("thing", Box(T_world_box, np.full(3, 0.4)))
-    with SessionStore(tmp_path / "sessions") as store:
+    with SessionStore(shelf.sessions) as store:
         read = Recording("ars", tmp_path, {0: camera}, frames, class_names=("thing",), boxes=(box,))
         made = store.create(read, name="long")
-    return tmp_path / "sessions", made.id
+    return shelf.sessions, made.id
 
 
 def open_panel(page: Page) -> None:

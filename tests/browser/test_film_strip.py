@@ -12,23 +12,25 @@ from playwright.sync_api import Locator, Page, Request, expect
 from ars_web.geometry.camera import Camera
 from ars_web.recordings.recording import Frame, Recording
 from ars_web.sessions.store import SessionStore
+from tests.browser.conftest import Shelf
 
 FRAMES = 36_000
 ASKED = re.compile(r"/frames/(\d+)/image$")
 
 
-@pytest.fixture
-def long_session(tmp_path: Path) -> tuple[Path, str]:
-    """A camera that walks along a wall for 36,000 frames, which all show the same small image."""
-    image = tmp_path / "image.jpg"
+@pytest.fixture(scope="module")
+def long_session(shelf: Shelf, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """A camera that walks along a wall for 36,000 frames, which all show the same small image. Looked at only."""
+    folder = tmp_path_factory.mktemp("long")
+    image = folder / "image.jpg"
     cv2.imwrite(str(image), np.full((240, 320, 3), 128, np.uint8))
     Ts = np.tile(np.eye(4), (FRAMES, 1, 1))
     Ts[:, 0, 3] = np.linspace(0.0, 20.0, FRAMES)
     frames = tuple(Frame(f"images/{i:05d}.jpg", image, 0, T) for i, T in enumerate(Ts))
     camera = Camera(320, 240, 300.0, 300.0, 159.5, 119.5, "pinhole", ())
-    with SessionStore(tmp_path / "sessions") as store:
-        made = store.create(Recording("ars", tmp_path, {0: camera}, frames), name="long")
-    return tmp_path / "sessions", made.id
+    with SessionStore(shelf.sessions) as store:
+        made = store.create(Recording("ars", folder, {0: camera}, frames), name="long")
+    return shelf.sessions, made.id
 
 
 def scrubber(page: Page) -> Locator:
@@ -190,16 +192,16 @@ def test_the_strip_follows_the_frame_but_not_against_a_hand_that_scrolls_it(long
         assert strip(page).evaluate("strip => strip.scrollLeft") == scrolled
 
 
-def test_a_picture_that_is_gone_says_why_and_moves_nothing(tmp_path: Path, open_flatly) -> None:
+def test_a_picture_that_is_gone_says_why_and_moves_nothing(shelf: Shelf, tmp_path: Path, open_flatly) -> None:
     paths = [tmp_path / f"{i}.png" for i in range(6)]
     for path in paths:
         cv2.imwrite(str(path), np.full((240, 320, 3), 90, np.uint8))
     frames = tuple(Frame(path.name, path, 0, np.eye(4)) for path in paths)
     camera = Camera(320, 240, 300.0, 300.0, 159.5, 119.5, "pinhole", ())
-    with SessionStore(tmp_path / "sessions") as store:
+    with SessionStore(shelf.sessions) as store:
         made = store.create(Recording("ars", tmp_path, {0: camera}, frames), name="holes")
     paths[2].unlink()
-    with open_flatly(tmp_path / "sessions", made.id) as workspace:
+    with open_flatly(shelf.sessions, made.id) as workspace:
         page = workspace.page
         broken = strip(page).get_by_role("option", name="Frame 2")
         expect(broken.get_by_title(re.compile("not there any more"))).to_be_visible()

@@ -7,14 +7,14 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-TOKEN = "token-of-the-login-test"
+from tests.browser.conftest import TOKEN, Shelf
+
 SESSION = "/sessions/abcdefghijk1"
 
 
-@pytest.fixture(scope="module")
-def base(served, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    with served(tmp_path_factory.mktemp("login") / "sessions", "--token", TOKEN) as (_, login):
-        yield login.partition("/login")[0]
+@pytest.fixture
+def base(shelf: Shelf) -> str:
+    return shelf.base
 
 
 @pytest.fixture

@@ -6,16 +6,18 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Page
 
+from tests.browser.conftest import TOKEN, Shelf
+
 
 @pytest.fixture(scope="module")
-def module(served, browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+def module(shelf: Shelf, browser: Browser) -> Iterator[Page]:
     """A page that may import the page's modules."""
-    with served(tmp_path_factory.mktemp("quantity") / "sessions") as (_, login):
-        context = browser.new_context()
-        page = context.new_page()
-        page.goto(login)
-        yield page
-        context.close()
+    context = browser.new_context()
+    assert context.request.post(f"{shelf.base}/login", data={"token": TOKEN}).ok
+    page = context.new_page()
+    page.goto(shelf.base)
+    yield page
+    context.close()
 
 
 def read(page: Page, text: str, kind: str = "length") -> dict[str, Any]:

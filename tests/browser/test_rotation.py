@@ -7,18 +7,20 @@ import pytest
 from playwright.sync_api import Browser, Page
 from scipy.spatial.transform import Rotation
 
+from tests.browser.conftest import TOKEN, Shelf
+
 EVERY = np.random.default_rng(7)
 
 
 @pytest.fixture(scope="module")
-def module(served, browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+def module(shelf: Shelf, browser: Browser) -> Iterator[Page]:
     """A page that may import the page's modules."""
-    with served(tmp_path_factory.mktemp("rotation") / "sessions") as (_, login):
-        context = browser.new_context()
-        page = context.new_page()
-        page.goto(login)
-        yield page
-        context.close()
+    context = browser.new_context()
+    assert context.request.post(f"{shelf.base}/login", data={"token": TOKEN}).ok
+    page = context.new_page()
+    page.goto(shelf.base)
+    yield page
+    context.close()
 
 
 def wxyz_of(page: Page, angles: np.ndarray) -> np.ndarray:

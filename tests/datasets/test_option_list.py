@@ -18,13 +18,15 @@ def given(name: str, value: object) -> dict[str, Any]:
 
 def test_every_option_is_there_but_those_that_leave_no_choice() -> None:
     assert list(OPTIONS) == [
-        "frames.step", "frames.start", "frames.stop", "frames.list", "images", "shape", "masks", "min_visible",
-        "max_truncated", "min_area_px", "heading_bins", "split.train", "split.val", "split.test", "split.by",
-        "split.seed", "sessions",
+        "frames.step", "frames.start", "frames.stop", "frames.list", "frames.count", "frames.by",
+        "frames.near_degrees", "frames.near_frames", "frames.sector", "frames.sector_box", "images", "shape", "masks",
+        "min_visible", "max_truncated", "min_area_px", "heading_bins", "split.train", "split.val", "split.test",
+        "split.by", "split.hold_out", "split.seed", "sessions",
     ]  # fmt: skip
     assert {name: option.type for name, option in OPTIONS.items() if option.type not in ("integer", "number")} == {
-        "frames.list": "integers", "images": "choice", "shape": "choice", "masks": "choice", "split.by": "choice",
-        "sessions": "texts",
+        "frames.list": "integers", "frames.by": "choice", "frames.sector": "range", "images": "choice",
+        "shape": "choice", "masks": "choice", "split.by": "choice",
+        "split.hold_out": "texts", "sessions": "texts",
     }  # fmt: skip
 
 
@@ -59,7 +61,9 @@ def test_every_choice_can_be_made_and_says_what_it_means(option: ExportOption) -
     assert option.default in [choice.value for choice in option.choices]
     for choice in option.choices:
         assert choice.meaning
-        ExportOptions.model_validate(given(option.name, choice.value))
+        # How frames are chosen means something only where some are.
+        count = {"frames": {"count": 3, "by": choice.value}}
+        ExportOptions.model_validate(count if option.name == "frames.by" else given(option.name, choice.value))
 
 
 def test_the_shape_that_nobody_chose_is_the_hull() -> None:

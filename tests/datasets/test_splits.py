@@ -91,3 +91,27 @@ def test_apportioning_gives_every_unit_away_once(units: int, cuts: tuple[int, in
 def test_places_count_within_each_split() -> None:
     assert places_in_splits(np.array([0, 0, 1, 0, 2, 1, 0])).tolist() == [0, 1, 0, 2, 0, 1, 3]
     assert places_in_splits(np.zeros(0, dtype=np.int64)).tolist() == []
+
+
+def by_sector(azimuths: list[float], **changes: object) -> list[int]:
+    choice = SplitChoice.model_validate({"train": 0.5, "val": 0.25, "test": 0.25, "by": "sector", **changes})
+    return assign([len(azimuths)], choice, azimuths=[np.array(azimuths)]).tolist()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_held_out_sectors_are_runs_that_cross_no_gap(seed: int) -> None:
+    # From 340 over 0 to 55 degrees: the widest gap lies between 55 and 340.
+    order = [340.0, 350.0, 0.0, 10.0, 20.0, 30.0, 40.0, 55.0]
+    found = by_sector(order, seed=seed)
+    val, test = (np.flatnonzero(np.array(found) == number) for number in (1, 2))
+    assert np.diff(val).tolist() == np.diff(test).tolist() == [1]
+    assert val[1] + 1 == test[0]
+    shuffled = [7, 2, 5, 0, 3, 6, 1, 4]
+    assert by_sector([order[i] for i in shuffled], seed=seed) == [found[i] for i in shuffled]
+
+
+def test_sectors_of_few_frames() -> None:
+    assert by_sector([]) == []
+    assert by_sector([10.0]) == [0]
+    assert sorted(by_sector([10.0, 200.0, float("nan")])) == [0, 1, 2]
+    assert by_sector([5.0, 6.0], train=0.0, val=1.0, test=0.0) == [1, 1]

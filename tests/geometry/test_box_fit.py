@@ -269,11 +269,16 @@ def test_a_start_far_away_does_as_well():
 
 
 class TestWhatCannotBeFitted:
-    random = np.random.default_rng(0)
-    Ts = round_about(8, random)
-    box = thing(random)
-    start = roughly(box, random)
-    seen = boxes_seen(BROWN, Ts, box, random)
+    @pytest.fixture(scope="class", autouse=True)
+    @staticmethod
+    def a_box_seen(request: pytest.FixtureRequest) -> None:
+        """Not as the class is read: every process would compile the labels while it collects its tests."""
+        its = request.cls
+        its.random = np.random.default_rng(0)
+        its.Ts = round_about(8, its.random)
+        its.box = thing(its.random)
+        its.start = roughly(its.box, its.random)
+        its.seen = boxes_seen(BROWN, its.Ts, its.box, its.random)
 
     def test_one_frame(self):
         with pytest.raises(BadInput, match="seen in two frames at least"):

@@ -4,7 +4,7 @@
  */
 
 import { computed, signal } from "../../lib/view.js";
-import { frames } from "../../store.js";
+import { frames, sid } from "../../store.js";
 import { balanced, isShareOfSplit } from "./shares.js";
 
 /** @typedef {import("../../store.js").Schemas} Schemas */
@@ -43,6 +43,11 @@ export const clashes = computed(() => {
   if (valueOf("split.by") === "session" && merged + 1 < wanted) {
     found.set("split.by", `${wanted} shares need ${wanted} sessions at least: choose more under “Merge with”, or divide by block.`);
   }
+  const used = [sid.value, .../** @type {string[]} */ (valueOf("sessions") ?? [])];
+  const heldOut = /** @type {string[]} */ (valueOf("split.hold_out") ?? []);
+  if (valueOf("split.by") === "session" && heldOut.some((id) => !used.includes(id))) {
+    found.set("split.hold_out", "A session is held out that is not in this dataset: merge it, or reset this.");
+  }
   return found;
 });
 /** Whether the draft can be counted and started, for all that the page knows. */
@@ -72,6 +77,9 @@ export function offer(found) {
 
 /** Whether an option means nothing beside the others. @param {string} name */
 export function isIdle(name) {
+  if (name === "frames.by") return (valueOf("frames.count") ?? null) === null;
+  if (name === "frames.sector_box") return (valueOf("frames.sector") ?? null) === null;
+  if (name === "split.hold_out") return valueOf("split.by") !== "session";
   return listsFrames.value && ["frames.step", "frames.start", "frames.stop"].includes(name);
 }
 

@@ -2,7 +2,8 @@
 
 import { html, useEffect, useSignal } from "../../lib/view.js";
 import { actions, frames, sid } from "../../store.js";
-import { setMistake, setOption, wrong } from "./draft.js";
+import { angles, parseAngles } from "./angles.js";
+import { setMistake, setOption, valueOf, wrong } from "./draft.js";
 import { parseFrames } from "./frame_list.js";
 import { capital, figure, many, runs, unit } from "./words.js";
 
@@ -19,6 +20,13 @@ import { capital, figure, many, runs, unit } from "./words.js";
  * @property {string} describedBy
  */
 
+/** What stands in a field that nothing is typed in. @type {Record<string, () => string>} */
+const PLACEHOLDERS = {
+  "frames.stop": () => figure(frames.value),
+  "frames.count": () => "all",
+  "frames.sector_box": () => "all",
+};
+
 /** @param {FieldProps} props */
 export function NumberOption(props) {
   const { option, value } = props;
@@ -31,7 +39,7 @@ export function NumberOption(props) {
       onInput=${(/** @type {any} */ event) => setOption(option.name, Number(event.currentTarget.value))}
     />`}
     <${TypedField}
-      ...${props} text=${value === null ? "" : String(value)} placeholder=${option.name === "frames.stop" ? figure(frames.value) : ""}
+      ...${props} text=${value === null ? "" : String(value)} placeholder=${PLACEHOLDERS[option.name]?.() ?? ""}
       read=${(/** @type {string} */ text) => readNumber(option, text)} step=${isShare ? 0.05 : 1}
     />
     ${unit(option) !== "" && html`<span class="unit">${unit(option)}</span>`}
@@ -43,6 +51,13 @@ export function FrameListField(props) {
   const { value } = props;
   return html`<${TypedField} ...${props} text=${value === null ? "" : runs(value)} placeholder="such as 0-9, 20, 35" read=${parseFrames} />
     ${value !== null && html`<span class="unit">${many(value.length, "frame")}</span>`}`;
+}
+
+/** @param {FieldProps} props */
+export function RangeField(props) {
+  const { value } = props;
+  return html`<${TypedField} ...${props} text=${value === null ? "" : angles(value)} placeholder="such as 0 to 180" read=${parseAngles} />
+    <span class="unit">${unit(props.option)}</span>`;
 }
 
 /**
@@ -114,12 +129,12 @@ function readNumber(option, text) {
 }
 
 /** @param {FieldProps} props */
-export function ChoiceField({ option, value, labelledBy, describedBy, invalid }) {
+export function ChoiceField({ option, value, idle, labelledBy, describedBy, invalid }) {
   return html`<div class="choices" role="radiogroup" aria-labelledby=${labelledBy} aria-describedby=${describedBy} aria-invalid=${invalid}>
     ${option.choices.map(
       (choice) => html`<label key=${choice.value} class="choice">
         <input
-          type="radio" aria-label=${capital(choice.value)} aria-describedby=${`${describedBy.split(" ")[0]}-${choice.value}`} name=${option.name} value=${choice.value} checked=${choice.value === value}
+          type="radio" aria-label=${capital(choice.value)} aria-describedby=${`${describedBy.split(" ")[0]}-${choice.value}`} name=${option.name} value=${choice.value} checked=${choice.value === value} disabled=${idle}
           onChange=${() => setOption(option.name, choice.value)}
         />
         <span><span class="name">${capital(choice.value)}</span>${choice.value === option.default && html` <span class="default">default</span>`}
@@ -129,25 +144,29 @@ export function ChoiceField({ option, value, labelledBy, describedBy, invalid })
   </div>`;
 }
 
-/** Further sessions, by their names. @param {FieldProps} props */
-export function SessionsField({ option, value, labelledBy, describedBy }) {
+/** Further sessions, or those of the dataset that are held out, by their names. @param {FieldProps} props */
+export function SessionsField({ option, value, idle, labelledBy, describedBy }) {
   const others = useSignal(/** @type {readonly Session[] | null} */ (null));
   const problem = useSignal(/** @type {string | null} */ (null));
   useEffect(() => {
     actions.sessions().then(
-      (found) => (others.value = found.filter((one) => one.id !== sid.value)),
+      (found) => (others.value = found),
       (error) => (problem.value = error.message),
     );
   }, []);
   if (problem.value !== null) return html`<p class="problem" role="alert">${problem.value}</p>`;
   if (others.value === null) return html`<p class="meaning" role="status">Looking for other sessions</p>`;
-  if (others.value.length === 0) return html`<p class="meaning">There is no other session yet.</p>`;
+  const merged = /** @type {string[]} */ (valueOf("sessions") ?? []);
+  const heldOut = option.name === "split.hold_out";
+  const offered = others.value.filter(({ id }) => (heldOut ? id === sid.value || merged.includes(id) : id !== sid.value));
+  if (heldOut && offered.length < 2) return html`<p class="meaning">There is one session in this dataset: merge another to hold one out.</p>`;
+  if (offered.length === 0) return html`<p class="meaning">There is no other session yet.</p>`;
   /** @param {string} id @param {boolean} wanted */
   const merge = (id, wanted) => setOption(option.name, wanted ? [...value, id] : value.filter((/** @type {string} */ one) => one !== id));
   return html`<div class="choices sessions" role="group" aria-labelledby=${labelledBy} aria-describedby=${describedBy}>
-    ${others.value.map(
+    ${offered.map(
       (one) => html`<label key=${one.id} class="choice">
-        <input type="checkbox" checked=${value.includes(one.id)} onChange=${(/** @type {any} */ event) => merge(one.id, event.currentTarget.checked)} />
+        <input type="checkbox" checked=${value.includes(one.id)} disabled=${idle} onChange=${(/** @type {any} */ event) => merge(one.id, event.currentTarget.checked)} />
         <span><span class="name">${one.name}</span> <span class="default">${many(one.frames, "frame")}, ${many(one.boxes, "box", "boxes")}</span></span>
       </label>`,
     )}

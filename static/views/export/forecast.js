@@ -4,6 +4,7 @@ import { html, signal, useSignalEffect } from "../../lib/view.js";
 import { actions, classes, revision } from "../../store.js";
 import { asked, format, isSound, refusals, refuse } from "./draft.js";
 import { Advice } from "./advice.js";
+import { ChoiceView } from "./choice.js";
 import { figure, imagesWords, many, REASONS, size, SPLITS } from "./words.js";
 
 /** @typedef {import("../../store.js").Schemas["Forecast"]} Forecast */
@@ -84,6 +85,7 @@ export function ForecastView() {
     ${found !== null &&
     html`<div class="figures" data-stale=${!isCurrent.value}>
       <${Totals} found=${found} />
+      <${ChoiceView} found=${found} />
       <${Advice} found=${found} />
       <${Counts} found=${found} />
       <${Dropped} found=${found} />
@@ -136,6 +138,8 @@ function Counts({ found }) {
       )}
     </tbody>
     <tfoot>
+      <tr title="An object seen from one of 648 equal parts of the sphere round it is one"><th scope="row">Directions seen</th>
+        ${splits.map(([split]) => html`<td key=${split} data-split=${split} data-count="directions"><span>${figure(found.directions.splits[split] ?? 0)}</span></td>`)}</tr>
       <tr><th scope="row">Labels</th>
         ${splits.map(([split, counts]) => html`<td key=${split} data-split=${split} data-count="all"><span>${figure(counts.labels)}</span></td>`)}</tr>
     </tfoot>

@@ -3,13 +3,13 @@
 import { Icon } from "../../lib/icon.js";
 import { html, useId } from "../../lib/view.js";
 import { changes, clashes, isIdle, mistakes, refusals, reset, valueOf } from "./draft.js";
-import { ChoiceField, FrameListField, NumberOption, SessionsField } from "./fields.js";
+import { ChoiceField, FrameListField, NumberOption, RangeField, SessionsField } from "./fields.js";
 import { valueWords } from "./words.js";
 
 /** @typedef {import("./draft.js").Option} Option */
 
 /** @type {Record<string, any>} */
-const FIELDS = { integer: NumberOption, number: NumberOption, choice: ChoiceField, integers: FrameListField, texts: SessionsField };
+const FIELDS = { integer: NumberOption, number: NumberOption, choice: ChoiceField, integers: FrameListField, texts: SessionsField, range: RangeField };
 
 /** @param {{title: string, holder: string, options: readonly Option[]}} props `holder`: the object that they are in */
 export function OptionGroup({ title, holder, options }) {

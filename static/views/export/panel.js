@@ -13,13 +13,15 @@ import { many } from "./words.js";
 /** @typedef {import("./draft.js").Option} Option */
 
 /** Options by what they are about: those of an object by its name, the others by theirs; what is new is about labels. */
+const CHOOSING = ["count", "by", "near_degrees", "near_frames", "sector", "sector_box"].map((name) => `frames.${name}`);
 const GROUPS = [
+  { title: "Choice among them", holder: "choosing", has: (/** @type {Option} */ { name }) => CHOOSING.includes(name) },
   { title: "Frames", holder: "frames", has: (/** @type {Option} */ { name }) => name.startsWith("frames.") || name === "sessions" },
   { title: "Images", holder: "images", has: (/** @type {Option} */ { name }) => name === "images" },
   { title: "Split", holder: "split", has: (/** @type {Option} */ { name }) => name.startsWith("split.") },
   { title: "Labels", holder: "labels", has: () => true },
 ];
-const ORDER = ["frames", "images", "labels", "split"];
+const ORDER = ["frames", "choosing", "images", "labels", "split"];
 
 export function ExportPanel() {
   const problem = useSignal(/** @type {string | null} */ (null));

@@ -1,5 +1,7 @@
 /** Figures and options of exports as people say them. */
 
+import { angles } from "./angles.js";
+
 /** @typedef {import("./draft.js").Option} Option */
 /** @typedef {import("../../store.js").Schemas} Schemas */
 
@@ -53,6 +55,7 @@ export function valueWords(option, value, nameOf = (sid) => sid) {
   if (value === null || value === undefined) return "none";
   if (option.type === "choice") return capital(String(value));
   if (option.type === "integers") return shortened(runs(/** @type {number[]} */ (value)));
+  if (option.type === "range") return `${angles(/** @type {number[]} */ (value))} °`;
   if (option.type === "texts") return /** @type {string[]} */ (value).map(nameOf).join(", ") || "none";
   return `${value}${unit(option) === "" ? "" : ` ${unit(option)}`}`;
 }
@@ -64,7 +67,9 @@ function shortened(text) {
 
 /** What an option's number counts, as its name says. @param {Option} option */
 export function unit(option) {
-  return option.name.endsWith("_px") ? "px" : "";
+  if (option.name.endsWith("_px")) return "px";
+  if (option.name.endsWith("_degrees") || option.type === "range") return "°";
+  return option.name.endsWith("_frames") ? "frames" : "";
 }
 
 /**

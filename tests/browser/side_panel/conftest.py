@@ -10,9 +10,6 @@ import httpx
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
-PATIENCE = 20_000
-"""Milliseconds, for busy machines; what is waited for comes at once elsewhere."""
-
 
 @dataclass(frozen=True)
 class SidePanel:
@@ -69,14 +66,12 @@ OpenPanel = Callable[[Path, str], AbstractContextManager[SidePanel]]
 
 
 @pytest.fixture
-def open_panel(open_flatly) -> Iterator[OpenPanel]:
-    """`with open_panel(sessions, sid) as panel`: a session's page by a server of its own."""
+def open_panel(open_flatly) -> OpenPanel:
+    """`with open_panel(sessions, sid) as panel`: a session's page."""
 
     @contextmanager
     def opened(sessions: Path, sid: str) -> Iterator[SidePanel]:
         with open_flatly(sessions, sid) as workspace:
             yield SidePanel(workspace.page, workspace.client, sid, workspace.answer, workspace.complaints)
 
-    expect.set_options(timeout=PATIENCE)
-    yield opened
-    expect.set_options(timeout=5_000)  # Playwright's own
+    return opened

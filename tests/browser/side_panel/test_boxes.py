@@ -9,14 +9,15 @@ from playwright.sync_api import expect
 
 from ars_web.recordings.registry import read_recording
 from ars_web.sessions.store import SessionStore
+from tests.browser.conftest import Shelf
 
 
 @pytest.fixture
-def plain_session(tmp_path: Path, demo_recording) -> tuple[Path, str]:
+def plain_session(shelf: Shelf, demo_recording) -> tuple[Path, str]:
     """The sessions folder and the id of the small demo, without boxes and classes."""
-    with SessionStore(tmp_path / "sessions") as store:
+    with SessionStore(shelf.sessions) as store:
         made = store.create(read_recording(demo_recording.folder, format="ars"), name="plain")
-    return tmp_path / "sessions", made.id
+    return shelf.sessions, made.id
 
 
 def test_boxes_are_listed_selected_by_keys_and_renamed_in_place(boxed_session, open_panel) -> None:

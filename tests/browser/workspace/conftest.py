@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Frame, Page
 
-TOKEN = "token-of-the-workspace-test"
+from tests.browser.conftest import TOKEN
 
 SETTLED = """() => {
     const viser = window.__viserMutable, points = window.__viserTestpoints;
@@ -131,15 +131,14 @@ class Workspace:
 
 
 @pytest.fixture
-def open_workspace(served, browser: Browser) -> Callable[..., Any]:
+def open_workspace(at_server, browser: Browser) -> Callable[..., Any]:
     """`with open_workspace(sessions) as (process, base, page_of)`; `page_of(sid)` opens another person's page."""
 
     @contextmanager
     def opened(sessions: Path, *options: str) -> Iterator[tuple[Popen[str], str, Callable[..., Workspace]]]:
         pages: list[Workspace] = []
         contexts: list[BrowserContext] = []
-        with served(sessions, "--token", TOKEN, *options) as (process, login):
-            base = login.partition("/login")[0]
+        with at_server(sessions, *options) as (process, base):
             with httpx.Client(base_url=base, headers={"Authorization": f"Bearer {TOKEN}"}, timeout=60) as client:
 
                 def page_of(sid: str, **context_options: Any) -> Workspace:

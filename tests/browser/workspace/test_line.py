@@ -3,6 +3,7 @@
 import json
 import socket
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -123,9 +124,9 @@ def port() -> int:
 
 
 def test_a_page_whose_login_is_worth_nothing_any_more_says_so_and_saves_what_is_typed_once_it_is(
-    served, boxed_session, browser: Browser, port: int
+    served, demo_in, tmp_path: Path, browser: Browser, port: int
 ) -> None:
-    sessions, sid = boxed_session
+    sessions, sid = demo_in(tmp_path / "sessions")
     context = browser.new_context(viewport={"width": 1280, "height": 720})
     context.route("**/scene/**", lambda route: route.fulfill(body="", content_type="text/html"))
     context.add_init_script("localStorage.setItem('ars-web.hints-seen', '1')")

@@ -3,6 +3,7 @@
 import signal
 import socket
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import httpx
@@ -13,11 +14,15 @@ from scipy.spatial.transform import Rotation
 
 from ars_web.sessions.editing import SessionEditor
 from ars_web.sessions.store import SessionStore
-
-# The token that open_workspace logs in with: the cookie outlives the server where its token does.
-TOKEN = "token-of-the-workspace-test"
+from tests.browser.conftest import TOKEN
 
 CAMERA = "() => window.__viserMutable.camera.position.toArray()"
+
+
+@pytest.fixture
+def boxed_session(demo_in, tmp_path: Path) -> tuple[Path, str]:
+    """The small demo's session in a folder of its own: its servers are killed."""
+    return demo_in(tmp_path / "sessions")
 
 
 @pytest.fixture
@@ -30,7 +35,8 @@ def port() -> int:
 
 @pytest.fixture
 def same_again(served, port: int) -> Callable[..., Any]:
-    """`with same_again(sessions):` another server on the port and the folder of the first."""
+    """`with same_again(sessions):` another server on the port and the folder of the first, with its token, which the
+    cookie outlives the server with."""
     return lambda sessions: served(sessions, "--token", TOKEN, "--port", str(port))
 
 

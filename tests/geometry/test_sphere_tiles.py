@@ -1,0 +1,86 @@
+"""Bins and cells as they are drawn: patches that hold their directions, and meshes seen from outside."""
+
+import numpy as np
+import pytest
+
+from ars_web.geometry.sphere_bins import SphereBins
+from ars_web.geometry.sphere_tiles import (
+    Tiles,
+    bin_patches,
+    cell_patches,
+    dots,
+    outlines,
+    patch_middles,
+    stand_ins,
+    tiles,
+)
+from ars_web.geometry.symmetry import Symmetry
+from ars_web.geometry.view_directions import evenly_over_sphere, folded
+
+MANY = [SphereBins(18, 9), SphereBins(1, 1), SphereBins(1, 2), SphereBins(7, 5)]
+
+
+def outward(mesh: Tiles) -> np.ndarray:
+    """(f,) twice the area of each face, positive where it is counter-clockwise from outside."""
+    a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
+    normals = np.cross(b - a, c - a)
+    return np.linalg.norm(normals, axis=1) * np.sign((normals * (a + b + c)).sum(axis=1))
+
+
+@pytest.mark.parametrize("bins", MANY)
+def test_a_direction_lies_within_the_patch_of_its_bin_and_of_its_cell(bins: SphereBins) -> None:
+    directions = evenly_over_sphere(500)
+    phi, theta = np.arctan2(directions[:, 1], directions[:, 0]), np.arccos(directions[:, 2])
+    for patches, found in zip((bin_patches(bins), cell_patches(bins)), bins.of(directions), strict=True):
+        left, right, top, bottom = patches[found].T
+        assert ((left <= phi) & (phi <= right) & (top <= theta) & (theta <= bottom)).all()
+    assert bins.of(patch_middles(bin_patches(bins)))[0].tolist() == list(range(bins.cells))
+
+
+@pytest.mark.parametrize("bins", MANY)
+def test_tiles_cover_the_sphere_but_for_the_gaps_between_them(bins: SphereBins) -> None:
+    whole = tiles(cell_patches(bins), gap=0.0)
+    areas = outward(whole)
+    assert (areas > -1e-12).all()
+    assert areas.sum() / 2 == pytest.approx(4 * np.pi, rel=0.02)
+    assert set(whole.owners.tolist()) == set(range(bins.cells))
+    assert len({frozenset(whole.owners[face]) for face in whole.faces}) == bins.cells  # no face is of two
+    apart = tiles(cell_patches(bins), gap=np.radians(1.0))
+    inside = apart.vertices[np.abs(apart.vertices[:, 2]) < 1.0 - 1e-9]
+    owners = apart.owners[np.abs(apart.vertices[:, 2]) < 1.0 - 1e-9]
+    assert bins.of(inside)[1].tolist() == owners.tolist() or bins.cells == 1
+    assert outward(apart).sum() <= areas.sum()
+
+
+def test_dots_are_round_spots_seen_from_outside() -> None:
+    directions = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [0.6, 0.8, 0.0]])
+    found = dots(directions, radius=0.1)
+    assert (outward(found) > 0).all()
+    away = np.arccos(np.clip((found.vertices * directions[found.owners]).sum(axis=1), -1.0, 1.0))
+    assert np.allclose(away.reshape(3, -1), [0.0] + 8 * [0.1])
+    assert len(dots(np.zeros((0, 3)), radius=0.1).faces) == 0
+
+
+def test_outlines_run_along_the_sides_and_not_through_a_pole() -> None:
+    bins = SphereBins(18, 9)
+    cap = outlines([cell_patches(bins)[0]])
+    assert np.allclose(cap[..., 2], bins.band_edges[1])
+    assert np.allclose(cap[0, 0], cap[-1, 1])
+    sides = outlines([bin_patches(bins)[4]])  # azimuth from -180 to -160 degrees, about the equator
+    phi, theta = np.arctan2(sides[..., 1], sides[..., 0]), np.arccos(sides[..., 2])
+    assert np.degrees([theta.min(), theta.max()]) == pytest.approx([80.0, 100.0])
+    assert set(np.degrees(phi).round().ravel().tolist()) <= {-180.0, 180.0, *range(-180, -159)}
+    assert len(outlines([])) == 0
+
+
+def test_a_bin_that_is_folded_shows_the_one_that_it_is_folded_to() -> None:
+    bins = SphereBins(18, 9)
+    for found in stand_ins(bins):
+        assert found.tolist() == list(range(bins.cells))
+    half_turn = Symmetry("discrete", rotations=(((0.0, 0.0, 1.0), 2),))
+    angles, cells = stand_ins(bins, half_turn)
+    middles = patch_middles(bin_patches(bins))
+    assert angles.tolist() == bins.of(folded(middles, half_turn))[0].tolist()
+    opposite = bins.of(middles * [-1.0, -1.0, 1.0])[0]
+    assert angles.tolist() == angles[opposite].tolist()
+    assert len(set(cells.tolist())) < bins.cells

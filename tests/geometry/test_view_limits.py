@@ -1,0 +1,78 @@
+"""Upright cameras, and limits on where they are."""
+
+import math
+
+import numpy as np
+import pytest
+
+from ars_web.errors import BadInput
+from ars_web.geometry.box import Box
+from ars_web.geometry.rigid_transform import checked
+from ars_web.geometry.view_limits import ViewLimits, check_room, looking_at, tilts_of
+
+
+def cube_at(z: float) -> Box:
+    T = np.eye(4)
+    T[2, 3] = z
+    return Box(T, np.full(3, 0.1))
+
+
+def limits(**changes: object) -> ViewLimits:
+    given = {"distance": (0.3, 0.6), "height": (0.1, 0.8), "tilt": (0.2, 1.2), **changes}
+    return ViewLimits(**given)  # pyright: ignore[reportArgumentType]
+
+
+def test_cameras_are_upright_and_see_their_targets_in_the_middle() -> None:
+    random = np.random.default_rng(0)
+    eyes, targets = random.normal(size=(2, 50, 3))
+    Ts = looking_at(eyes, targets)
+    for T, eye, target in zip(Ts, eyes, targets, strict=True):
+        assert checked(T) == pytest.approx(T)
+        x, y, z = np.linalg.inv(T) @ [*target, 1.0] @ np.eye(4)[:, :3]
+        assert (x, y) == pytest.approx((0.0, 0.0), abs=1e-12)
+        assert z == pytest.approx(np.linalg.norm(target - eye))
+        assert T[2, 0] == 0.0, "the image's x is horizontal"
+        assert T[2, 1] <= 0.0, "up in the world is up in the image"
+    down = np.arctan2(eyes[:, 2] - targets[:, 2], np.linalg.norm((eyes - targets)[:, :2], axis=1))
+    assert tilts_of(Ts) == pytest.approx(down)
+
+
+def test_straight_down_and_up_the_image_s_x_is_the_world_s() -> None:
+    eyes, targets = np.array([[1.0, 2.0, 3.0], [1.0, 2.0, -3.0]]), np.array([[1.0, 2.0, 0.0]] * 2)
+    Ts = looking_at(eyes, targets)
+    assert Ts[0, :3, :3].T.tolist() == [[1, 0, 0], [0, -1, 0], [0, 0, -1]]
+    assert Ts[1, :3, :3].T.tolist() == [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    assert tilts_of(Ts) == pytest.approx([math.pi / 2, -math.pi / 2])
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"distance": (0.6, 0.3)}, "the limits of distance are the wrong way round: 0.6 is more than 0.3"),
+        ({"height": (0.6, 0.3)}, "the limits of height are the wrong way round"),
+        ({"tilt": (0.6, 0.3)}, "the limits of tilt are the wrong way round"),
+        ({"distance": (math.nan, 0.3)}, "the limits of distance must be finite numbers of metres, not nan and 0.3"),
+        ({"height": (0.0, math.inf)}, "the limits of height must be finite numbers of metres"),
+        ({"distance": (0.3, 1e300)}, "the limits of distance must be within 1e\\+07 metres"),
+        ({"distance": (-0.1, 0.3)}, "a distance must be more than 0 m, not -0.1 to 0.3"),
+        ({"distance": (0.0, 0.0)}, "a distance must be more than 0 m"),
+        ({"tilt": (0.0, 2.0)}, "a tilt lies between -90 degrees, straight up, and 90, straight down, not 0 to 114.592"),
+        ({"min_visible": 1.5}, "from 0 to 1, not 1.5"),
+        ({"min_visible": math.nan}, "from 0 to 1, not nan"),
+        ({"clearance": -0.1}, "the clearance must be 0 m or more, not -0.1"),
+    ],
+)
+def test_limits_that_cannot_be(changes: dict[str, object], said: str) -> None:
+    with pytest.raises(BadInput, match=said):
+        limits(**changes)
+
+
+def test_limits_that_leave_no_room_are_named() -> None:
+    check_room(limits(), [cube_at(0.1)])
+    check_room(limits(height=(2.5, 3.0)), [cube_at(0.1), cube_at(2.3)])
+    with pytest.raises(BadInput, match=r"no camera is 2\.5 to 3 m high and within 0\.6 m of an object"):
+        check_room(limits(height=(2.5, 3.0)), [cube_at(0.1)])
+    with pytest.raises(
+        BadInput, match=r"tilts of 0 to 5\.73 degrees at distances of 0\.3 to 0\.6 m put the camera 0\.1"
+    ):
+        check_room(limits(height=(0.5, 3.0), tilt=(0.0, 0.1)), [cube_at(0.1)])
