@@ -88,7 +88,7 @@ def write_findings(figures: Figures, out: Path) -> Sequence[Path]:
     files[0].write_text(json.dumps(asdict(figures), indent=1))
     files[1].write_bytes(curves)
     page = report_page(
-        "report.html",
+        "study.html",
         templates=Path(__file__).parent,
         study=figures.study,
         figures=figures,

@@ -1,7 +1,8 @@
 """What a trained detector finds in a split of an exported set, as COCO results.
 
-python -m examples.train_detector.predict desk.pt datasets/desk --split val --out predictions.json
-ars-web evaluate --truth datasets/desk --predictions predictions.json
+    python -m examples.train_detector.predict desk.pt datasets/desk --split val --out predictions.json
+
+`ars-web evaluate` reads them.
 """
 
 import argparse

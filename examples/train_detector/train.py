@@ -40,7 +40,7 @@ class Options:
     """
 
     size: tuple[int, int] = (160, 120)
-    iterations: int = 600
+    iterations: int = 400
     batch: int = 16
     rate: float = 4e-3
     seed: int = 0
