@@ -12,13 +12,12 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import orjson
 import torch
-from pydantic import BaseModel
 
 from ars_web.errors import ArsError, BadInput
 from examples.train_detector.dataset import Dataset, load_image, read_dataset
 from examples.train_detector.network import Detector, load
+from examples.train_detector.results import Result, write_results
 from examples.train_detector.targets import decode
 from examples.train_detector.train import as_input
 
@@ -26,15 +25,6 @@ LEAST_SCORE = 0.02
 """Fainter boxes are not written: they come after all others, where they change no curve that is looked at."""
 
 BATCH = 16
-
-
-class Result(BaseModel):
-    """One of COCO's results; `bbox` is x, y, width, height in the image as it lies in the set."""
-
-    image_id: int | str
-    category_id: int | str
-    bbox: tuple[float, float, float, float]
-    score: float
 
 
 def predict(detector: Detector, dataset: Dataset, *, size: tuple[int, int]) -> list[Result]:
@@ -54,12 +44,6 @@ def predict(detector: Detector, dataset: Dataset, *, size: tuple[int, int]) -> l
                 category = dataset.categories[class_]
                 results.append(Result(image_id=picture.id, category_id=category, bbox=bbox, score=round(score, 4)))
     return results
-
-
-def write_results(results: Sequence[Result], file: Path) -> None:
-    """Write them as COCO's JSON list."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_bytes(b"[" + b",\n".join(orjson.dumps(result.model_dump()) for result in results) + b"]\n")
 
 
 def _size_of(file: Path) -> tuple[int, int]:

@@ -28,7 +28,8 @@ from examples.train_detector.filming import film
 from examples.train_detector.findings import Figures, Run, write_findings
 from examples.train_detector.network import save
 from examples.train_detector.plan import FULL, QUICK, SCENES, Configuration, Study, frames_of
-from examples.train_detector.predict import predict, write_results
+from examples.train_detector.predict import predict
+from examples.train_detector.results import write_results
 from examples.train_detector.scores import score
 from examples.train_detector.sets import export, make_session, tightness, write_truth
 from examples.train_detector.train import Options, train

@@ -1,7 +1,11 @@
-"""`examples` is no installed package: it is found beside the tests. A small exported set that the examples train on."""
+"""`examples` is no installed package: it is found beside the tests. A small exported set that the examples train on.
+
+What trains is looked at where PyTorch is, which is the extra `train`: it is too large to be among what tests need.
+"""
 
 import sys
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -11,6 +15,8 @@ from ars_web.datasets.options import ExportOptions
 from ars_web.recordings.recording import RecordedBox
 from ars_web.recordings.registry import read_recording
 from ars_web.sessions.store import SessionStore
+
+collect_ignore = [] if find_spec("torch") else ["test_training.py"]
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 

@@ -16,7 +16,7 @@ from examples.train_detector.dataset import read_dataset
 from examples.train_detector.filming import film, outlines
 from examples.train_detector.findings import Figures, Run, findings, write_findings
 from examples.train_detector.plan import Configuration, frames_of
-from examples.train_detector.predict import Result, write_results
+from examples.train_detector.results import Result, write_results
 from examples.train_detector.scores import Scores, score
 
 SIZE = (128, 96)
