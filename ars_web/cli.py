@@ -7,7 +7,7 @@ there at once.
 import os
 import signal
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from io import TextIOWrapper
 from pathlib import Path
@@ -18,10 +18,18 @@ import typer
 from ars_web import arguments as take
 from ars_web import box_commands, class_commands, judging_commands, kernel_cache, label_commands, study_commands
 from ars_web.errors import ArsError
-from ars_web.terminal import has_screen, note, open_browser, print_json, print_table, progress
+from ars_web.terminal import (
+    has_screen,
+    note,
+    open_browser,
+    print_forecast,
+    print_json,
+    print_lost,
+    print_table,
+    progress,
+)
 
 if TYPE_CHECKING:
-    from ars_web.datasets.planned import ExportPlan
     from ars_web.recordings.recording import SkippedFrame
 
 DRY_RUN_FOLDER = ".ars-web-dry-run"
@@ -298,7 +306,7 @@ def export(
             if isinstance(target, Path)
             else plan_stored_export(snapshots, format=kind, options=options)
         )
-        _print_forecast(planned, as_json=as_json)
+        print_forecast(planned, as_json=as_json)
         return
     try:
         if isinstance(target, Path):
@@ -325,38 +333,12 @@ def export(
     else:
         rows = [(name, s.images, s.negatives, s.labels) for name, s in report.splits.items()]
         print_table(("split", "images", "without a label", "labels"), rows)
-        _print_lost(report.dropped, report.losses)
+        print_lost(report.dropped, report.losses)
         if checked is not None:
             print(*checked.lines(), sep="\n")
         print(target)
     if checked is not None and not checked.agrees:
         raise typer.Exit(1)
-
-
-def _print_forecast(plan: "ExportPlan", *, as_json: bool) -> None:
-    """What an export would write, and which frames it takes of which session."""
-    from ars_web.datasets.forecast import forecast
-
-    found = forecast(plan)
-    if as_json:
-        chosen = {
-            session.id: plan.frames.index[plan.frames.session == number].tolist()
-            for number, session in enumerate(plan.sessions)
-        }
-        print_json({"forecast": found.model_dump(mode="json"), "frames": chosen})
-        return
-    seen = found.directions.splits
-    rows = [(name, s.images, s.negatives, s.labels, seen[name]) for name, s in found.splits.items()]
-    print_table(("split", "images", "without a label", "labels", "directions"), rows)
-    print(*found.lines(), sep="\n")
-    _print_lost(found.dropped, found.losses)
-
-
-def _print_lost(dropped: Mapping[str, int], losses: Sequence[str]) -> None:
-    reasons = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in dropped.items() if count)
-    print(f"dropped: {reasons or 'none'}")
-    for loss in losses:
-        print(f"lost: {loss}")
 
 
 @app.command()

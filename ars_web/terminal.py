@@ -3,9 +3,13 @@
 import os
 import sys
 import time
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ars_web.datasets.planned import ExportPlan
 
 LINES_EVERY = 5.0
 """Seconds between two lines of progress where there is no terminal to draw a bar on."""
@@ -55,6 +59,33 @@ def print_table(titles: Sequence[str], rows: Sequence[Sequence[object]]) -> None
             for cell, width, numeric in zip(line, widths, right, strict=True)
         )
         print("  ".join(padded).rstrip())
+
+
+def print_forecast(plan: "ExportPlan", *, as_json: bool) -> None:
+    """What an export would write, and which frames it takes of which session."""
+    from ars_web.datasets.forecast import forecast
+
+    found = forecast(plan)
+    if as_json:
+        chosen = {
+            session.id: plan.frames.index[plan.frames.session == number].tolist()
+            for number, session in enumerate(plan.sessions)
+        }
+        print_json({"forecast": found.model_dump(mode="json"), "frames": chosen})
+        return
+    seen = found.directions.splits
+    rows = [(name, s.images, s.negatives, s.labels, seen[name]) for name, s in found.splits.items()]
+    print_table(("split", "images", "without a label", "labels", "directions"), rows)
+    print(*found.lines(), sep="\n")
+    print_lost(found.dropped, found.losses)
+
+
+def print_lost(dropped: Mapping[str, int], losses: Sequence[str]) -> None:
+    """The labels that an export drops, by reason, and what its format cannot hold."""
+    reasons = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in dropped.items() if count)
+    print(f"dropped: {reasons or 'none'}")
+    for loss in losses:
+        print(f"lost: {loss}")
 
 
 @contextmanager

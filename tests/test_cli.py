@@ -216,18 +216,8 @@ def test_export_takes_every_option(run: Commands, session: str, recording: Path,
         *("--workers", 1),
     )
     assert json.loads(done.stdout)["report"]["options"] == {
-        "frames": {
-            "step": 2,
-            "start": 1,
-            "stop": 5,
-            "list": None,
-            "count": 2,
-            "by": "even",
-            "near_degrees": 0.5,
-            "near_frames": 1,
-            "sector": None,
-            "sector_box": None,
-        },
+        "frames": {"step": 2, "start": 1, "stop": 5, "list": None}
+        | {"count": 2, "by": "even", "near_degrees": 0.5, "near_frames": 1, "sector": None, "sector_box": None},
         "images": "none",
         "shape": "box",
         "min_visible": 0.1,
@@ -238,34 +228,8 @@ def test_export_takes_every_option(run: Commands, session: str, recording: Path,
         "split": {"train": 0.5, "val": 0.25, "test": 0.25, "by": "frame", "hold_out": [], "seed": 7},
         "sessions": [other],
     }
-    # The camera of frame 0 stands straight below the box: it looks from no side.
-    listed = run(
-        *("export", session, "--format", "ars", "--out", tmp_path / "ars", "--json", "--frames-list", "0,3,4"),
-        *("--frames-sector", "-90:90", "--frames-sector-box", 1),
-    )
+    listed = run("export", session, "--format", "ars", "--out", tmp_path / "ars", "--frames-list", "0,3", "--json")
     assert sum(split["images"] for split in json.loads(listed.stdout)["report"]["splits"].values()) == 2
-
-
-def test_a_dry_run_tells_which_frames_and_what_they_cover_and_writes_nothing(
-    shared: tuple[Commands, str], tmp_path: Path
-) -> None:
-    run, session = shared
-    choice = ("--frames-count", 3, "--frames-near-frames", 1)
-    printed = run("export", session, "--format", "yolo", "--out", tmp_path / "d", "--dry-run", *choice).stdout
-    assert not (tmp_path / "d").exists()
-    assert "frames: 3 of 6 chosen, 3 near twins of chosen ones" in printed
-    assert re.search(r"directions: \d+ covered, of \d+ that all 6 frames show; \d+ by as many evenly spaced", printed)
-    found = json.loads(run("export", session, "--format", "yolo", "--dry-run", "--json", *choice).stdout)
-    assert len(found["frames"][session]) == found["forecast"]["choice"]["chosen"] == 3
-    assert (np.diff(found["frames"][session]) > 1).all()
-    assert found["forecast"]["directions"]["all"] == found["forecast"]["choice"]["directions"]
-
-
-def test_a_recording_is_held_out_by_name(run: Commands, session: str, recording: Path) -> None:
-    run("import", recording, "--name", "second", "--classes", "cube")
-    line = ("export", session, "--format", "yolo", "--merge", "second", "--images", "none", "--dry-run")
-    held = run(*line, "--split-by", "session", "--split-hold-out", session).stdout
-    assert [row.split()[:3] for row in held.splitlines()[1:3]] == [["train", "6", "6"], ["val", "6", "0"]]
 
 
 @pytest.mark.parametrize("arguments", [("list",), ("check",), ("formats",), ("import", "RECORDING"), ("openapi",)])
@@ -290,13 +254,6 @@ def test_json_is_all_there_is_on_stdout(
         (("export", "SESSION", "--format", "yolo", "--out", "D", "--frames-step", "0"), "--frames-step"),
         (("export", "SESSION", "--format", "yolo", "--out", "D", "--frames-list", "1,x"), "--frames-list"),
         (("export", "SESSION", "--format", "yolo", "--out", "D", "--frames-list", "1", "--frames-step", "2"), "both"),
-        (("export", "SESSION", "--format", "yolo", "--out", "D", "--frames-count", "0"), "--frames-count"),
-        (("export", "SESSION", "--format", "yolo", "--out", "D", "--frames-sector", "90"), "such as 0:180"),
-        (("export", "SESSION", "--format", "yolo", "--out", "D", "--frames-sector", "nan:9"), "--frames-sector"),
-        (("export", "SESSION", "--format", "yolo", "--out", "D", "--frames-by", "even"), "give a count"),
-        (("export", "SESSION", "--format", "yolo", "--out", "D", "--split-hold-out", "SESSION"), "split by 'session'"),
-        (("export", "SESSION", "--format", "yolo", "--dry-run", "--check"), "--check"),
-        (("export", "SESSION", "--format", "yolo"), "--out"),
         (("export", "SESSION", "--format", "yolo", "--out", "D", "--split-train", "0.9"), "--split-train"),
         (("export", "SESSION", "--format", "yolo", "--out", "D", "--images", "steal"), "--images"),
         (("export", "SESSION", "--format", "yolo", "--out", "D", "--heading-bins", "8"), "an option of compass"),
