@@ -21,64 +21,15 @@
 (() => {
   "use strict";
 
-  /**
-   * The parts that are used of `window.__viserMutable`, viser 1.1.1's handle for tests.
-   *
-   * @typedef {object} Vector
-   * @property {number} x
-   * @property {number} y
-   * @property {number} z
-   * @property {() => Vector} clone
-   * @property {(x: number, y: number, z: number) => Vector} set
-   * @property {(matrix: unknown) => Vector} setFromMatrixPosition
-   * @property {(matrix: unknown) => Vector} applyMatrix4
-   *
-   * @typedef {object} Camera three.js's PerspectiveCamera; `fov` is vertical, in degrees
-   * @property {number} fov
-   * @property {Vector} position
-   * @property {{toArray: () => number[]}} matrixWorld
-   * @property {unknown} matrixWorldInverse
-   * @property {(parents: boolean, children: boolean) => void} updateWorldMatrix
-   * @property {unknown} projectionMatrix
-   * @property {() => void} updateProjectionMatrix
-   * @property {(fullWidth: number, fullHeight: number, x: number, y: number, width: number, height: number) => void} setViewOffset
-   * @property {() => void} clearViewOffset
-   *
-   * @typedef {object} Material
-   * @property {number} opacity
-   * @property {boolean} toneMapped
-   * @property {boolean} needsUpdate
-   * @property {boolean} colorWrite
-   * @property {boolean} depthWrite
-   *
-   * @typedef {object} Node
-   * @property {boolean} visible
-   * @property {Node | null} parent
-   * @property {Material} [material]
-   * @property {unknown} matrixWorld
-   * @property {(parents: boolean, children: boolean) => void} updateWorldMatrix
-   * @property {{x: number, setScalar: (scale: number) => void}} scale
-   * @property {(callback: (node: Node) => void) => void} traverse
-   *
-   * @typedef {object} Controls
-   * @property {boolean} enabled
-   * @property {Record<string, number>} mouseButtons
-   * @property {Record<string, number>} touches
-   *
-   * @typedef {object} Viser
-   * @property {HTMLCanvasElement} canvas
-   * @property {Camera} camera
-   * @property {Controls} cameraControl
-   * @property {Record<string, Node | null | undefined>} nodeRefFromName null: not there any more
-   * @property {() => void} requestRender
-   */
+  /** @typedef {import("./viser_client").Viser} Viser */
+  /** @typedef {import("./viser_client").Node} Node */
+  /** @typedef {import("./viser_client").Controls} Controls */
 
   const PARTS = ["canvas", "camera", "cameraControl", "nodeRefFromName", "requestRender"];
   const PATIENCE = 30_000;
   const LARGEST_ZOOM = 20;
   const STILL = 4; // CSS pixels that a press may move and be a click
-  const SPHERE = "/coverage/sphere"; // as in scene/coverage_sphere.py
-  const PHOTO = "/photo"; // as in scene/frame_view.py
+  const [PHOTO, SPHERE] = ["/photo", "/coverage/sphere"]; // as in scene/frame_view.py and scene/coverage_sphere.py
   /** Of a box: a cube of side 1 in its own coordinates. @param {number} id */
   const edgesOf = (id) => `/boxes/${id}/at/edges`; // as in scene/boxes.py
   const SHARE = 0.6; // of the window, that a box fills which is zoomed to
@@ -372,9 +323,8 @@
   /** Colours that mean numbers are shown as they are, not as a film would. @param {Viser} viser */
   function showTrueColours(viser) {
     viser.nodeRefFromName[SPHERE]?.traverse(({ material }) => {
-      if (material === undefined || !material.toneMapped) return;
-      material.toneMapped = false;
-      material.needsUpdate = true;
+      if (!material?.toneMapped) return;
+      [material.toneMapped, material.needsUpdate] = [false, true];
       viser.requestRender();
     });
   }
@@ -498,12 +448,10 @@
 
   /** @param {Viser} viser */
   function placeNumbers(viser) {
-    const { camera, canvas, nodeRefFromName } = viser;
-    const root = nodeRefFromName[""];
+    const { camera, canvas, nodeRefFromName: { "": root } } = viser;
     if (numbers.length === 0 || root == null) return;
     const { x: left, y: top, width, height } = canvas.getBoundingClientRect();
-    root.updateWorldMatrix(true, false);
-    camera.updateWorldMatrix(true, false);
+    for (const node of [root, camera]) node.updateWorldMatrix(true, false);
     for (const { point, chip } of numbers) {
       const eye = camera.position.clone().set(...point).applyMatrix4(root.matrixWorld).applyMatrix4(camera.matrixWorldInverse);
       const ahead = eye.z < 0;
