@@ -18,11 +18,16 @@ demo: .venv/runtime.stamp
 # How the tests are spread when all are run; tests/conftest.py says which go together and in which order.
 SPREAD := -n 2 --dist loadfile --no-loadscope-reorder
 
-# `make test ARGS="tests/api -q"` runs some, in one process. Bytecode is kept whatever the environment says: the tests
-# start hundreds of processes, each of which would compile the whole package first.
+# All of them in two steps, since a process that drives a browser has an event loop that never ends, beside which no test
+# can have its own. `make test ARGS="tests/api -q"` runs some, in one process. Bytecode is kept whatever the environment
+# says: the tests start hundreds of processes, each of which would compile the whole package first.
 test: export PYTHONDONTWRITEBYTECODE =
 test: .venv/dev.stamp
-	ARS_WEB_CHROMIUM="$$(.ci/chromium)" && export ARS_WEB_CHROMIUM && $(BIN)/python -m pytest $(or $(ARGS),$(SPREAD))
+	ARS_WEB_CHROMIUM="$$(.ci/chromium)" && export ARS_WEB_CHROMIUM && if [ -n "$(ARGS)" ]; then \
+	    $(BIN)/python -m pytest $(ARGS); \
+	else \
+	    $(BIN)/python -m pytest $(SPREAD) --ignore tests/browser && $(BIN)/python -m pytest $(SPREAD) tests/browser; \
+	fi
 
 check: .venv/dev.stamp
 	$(BIN)/ruff format --check .

@@ -7,8 +7,8 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryFile
 from types import ModuleType
+from typing import IO
 
 import pytest
 from hypothesis import settings
@@ -93,22 +93,23 @@ def demo_recording(tmp_path_factory: pytest.TempPathFactory):
 
 
 @contextmanager
-def _served(sessions: Path, *options: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+def _served(sessions: Path, *options: str, log: IO[str] | None = None) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """`log` is where what it says of errors goes; without one a pipe, which stops a server that has much to say."""
     command = [sys.executable, "-m", "ars_web", "serve", "--sessions", str(sessions), "--port", "0", *options]
     # The ars_web beside this file, whether or not one is installed.
     search = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
-    with TemporaryFile("w+") as log:  # a pipe that nobody reads would stop a server that has much to say
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True, env=search)
-        try:
-            said = [process.stdout.readline() for _ in range(2)]
-            if "/login?code=" not in said[-1]:
-                process.wait()
-                log.seek(0)
-                raise AssertionError("".join(said) + log.read())
-            yield process, said[-1].split()[-1]
-        finally:
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE if log is None else log, text=True, env=search
+    )
+    try:
+        said = [process.stdout.readline() for _ in range(2)]
+        if "/login?code=" not in said[-1]:
             process.kill()
-            process.communicate()
+            raise AssertionError("".join(said) + (process.communicate()[1] or ""))
+        yield process, said[-1].split()[-1]
+    finally:
+        process.kill()
+        process.communicate()
 
 
 @pytest.fixture(scope="session")
@@ -172,7 +173,7 @@ LONG = ("tests/faults/", "tests/recorded/", "tests/demo/", "tests/datasets/test_
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Scenes first, then what takes long; the other browser tests last, when no scene is drawn any more."""
+    """Scenes first, then what takes long; the other browser tests last."""
 
     def place(item: pytest.Item) -> int:
         if item.nodeid.startswith(SCENES):

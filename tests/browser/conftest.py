@@ -7,6 +7,7 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from subprocess import Popen
+from tempfile import TemporaryFile
 from typing import Any
 
 import httpx
@@ -71,7 +72,7 @@ class Shelf:
 def shelf(served, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shelf]:
     """The server of all tests that do nothing to theirs: to start one takes three seconds of the processor."""
     sessions = tmp_path_factory.mktemp("shelf") / "sessions"
-    with served(sessions, "--token", TOKEN) as (process, login):
+    with TemporaryFile("w+") as log, served(sessions, "--token", TOKEN, log=log) as (process, login):
         yield Shelf(process, sessions, login.partition("/login")[0])
 
 
