@@ -151,6 +151,7 @@ export function editBox(id, place, hold = false) {
     store.setProblem(`box:${id}`, `${from.name} is locked: unlock it to move it.`);
     return;
   }
+  store.setProblem(`box:${id}`, null);
   if (held !== null) clearTimeout(held.timer);
   held = { id, place, from, timer: hold ? undefined : setTimeout(() => void finishEdit(), QUIET) };
   showPreview({ box_id: id, ...place });
@@ -165,7 +166,6 @@ export async function finishEdit() {
   if (Object.keys(changes).length === 0) return endPreview(store.typed.value);
   try {
     await change(from, changes);
-    store.setProblem(`box:${id}`, null);
   } catch (error) {
     if (!(error instanceof api.ApiError)) throw error;
     store.setProblem(`box:${id}`, error.message);
@@ -291,9 +291,9 @@ export async function stepHistory(which) {
   await finishEdit();
   // What is under way is part of the history that is stepped through.
   await Promise.all(queues.values());
+  store.setProblem("history", null);
   try {
     await inTurn("history", () => api[which](store.sid.value));
-    store.setProblem("history", null);
   } catch (error) {
     if (!(error instanceof api.ApiError)) throw error;
     store.setProblem("history", error.message);

@@ -206,10 +206,25 @@ export const binsOf = ({ degrees }) => ({ azimuth_bins: 360 / degrees, polar_bin
 
 /** @param {string} place @param {string | null} text null: nothing is wrong there any more */
 export function setProblem(place, text) {
-  const next = new Map(problems.value);
+  if (text === null && !problems.peek().has(place)) return;
+  const next = new Map(problems.peek());
   if (text === null) next.delete(place);
   else next.set(place, text);
   problems.value = next;
+}
+
+/**
+ * Do something, and say at `place` what goes wrong with it. What was said there before is over as it begins, not as it
+ * ends: what is said there meanwhile is about something else.
+ * @param {string} place @param {() => Promise<unknown>} work
+ */
+export async function attempt(place, work) {
+  setProblem(place, null);
+  try {
+    await work();
+  } catch (error) {
+    setProblem(place, /** @type {Error} */ (error).message);
+  }
 }
 
 /**

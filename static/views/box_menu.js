@@ -17,12 +17,12 @@ export function boxMenu(box, { rename, chooseClass }) {
   return [
     { title: "Rename", keys: "F2", run: rename },
     { title: "Class…", run: chooseClass, disabled: locked || store.classes.value.size < 2 },
-    { title: "Duplicate", keys: keys("duplicate"), run: () => at(id, store.actions.duplicateBox(id)) },
-    { title: "Rest on ground", keys: keys("ground"), run: () => at(id, store.actions.restOnGround(id)), disabled: locked },
+    { title: "Duplicate", keys: keys("duplicate"), run: () => at(id, () => store.actions.duplicateBox(id)) },
+    { title: "Rest on ground", keys: keys("ground"), run: () => at(id, () => store.actions.restOnGround(id)), disabled: locked },
     { title: locked ? "Unlock" : "Lock", keys: keys("lock"), run: () => toggleLock(box) },
     { title: store.hidden.value.has(id) ? "Show" : "Hide", keys: keys("hide"), run: () => toggleHidden(id) },
     null,
-    { title: "Delete", keys: keys("delete"), run: () => at(id, store.actions.deleteBox(id)), disabled: locked, bad: true },
+    { title: "Delete", keys: keys("delete"), run: () => at(id, () => store.actions.deleteBox(id)), disabled: locked, bad: true },
   ];
 }
 
@@ -31,13 +31,13 @@ export function classMenu(box) {
   return [...store.classes.value.values()].map((one) => ({
     title: one.id === box.class_id ? `${one.name} (now)` : one.name,
     disabled: one.id === box.class_id,
-    run: () => at(box.id, store.actions.changeBox(box.id, { class_id: one.id })),
+    run: () => at(box.id, () => store.actions.changeBox(box.id, { class_id: one.id })),
   }));
 }
 
 /** @param {Box} box */
 export function toggleLock(box) {
-  at(box.id, store.actions.changeBox(box.id, { locked: !box.locked }));
+  at(box.id, () => store.actions.changeBox(box.id, { locked: !box.locked }));
 }
 
 /** @param {number} id */
@@ -47,10 +47,7 @@ export function toggleHidden(id) {
   store.hidden.value = next;
 }
 
-/** @param {number} id @param {Promise<void>} work */
+/** @param {number} id @param {() => Promise<void>} work */
 function at(id, work) {
-  work.then(
-    () => store.setProblem(`box:${id}`, null),
-    (error) => store.setProblem(`box:${id}`, error.message),
-  );
+  void store.attempt(`box:${id}`, work);
 }

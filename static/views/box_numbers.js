@@ -58,9 +58,9 @@ function Numbers({ box }) {
   /** @param {RowName} row @param {number} axis @param {number} value */
   const commit = async (row, axis, value) => {
     const { T_world_box, size } = changed(row, axis, value);
+    store.setProblem(`box:${box.id}`, null);
     try {
       await store.actions.changeBox(box.id, row === "Size" ? { size } : { T_world_box });
-      store.setProblem(`box:${box.id}`, null);
     } catch (error) {
       // The field shows it, unless another box is looked at by now.
       if (store.selected.value !== box.id) store.setProblem(`box:${box.id}`, /** @type {Error} */ (error).message);
@@ -142,10 +142,7 @@ function ClassOfBox({ box }) {
     onChange=${(/** @type {any} */ event) => {
       const wanted = Number(event.currentTarget.value);
       event.currentTarget.value = String(box.class_id);
-      store.actions.changeBox(box.id, { class_id: wanted }).then(
-        () => store.setProblem(`box:${box.id}`, null),
-        (error) => store.setProblem(`box:${box.id}`, error.message),
-      );
+      void store.attempt(`box:${box.id}`, () => store.actions.changeBox(box.id, { class_id: wanted }));
     }}
   >${[...store.classes.value.values()].map((one) => html`<option key=${one.id} value=${one.id}>${one.name}</option>`)}</select>`;
 }

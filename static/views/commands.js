@@ -34,10 +34,7 @@ const inFrame = () => store.mode.value === "frame";
 function onBox(action) {
   const id = store.selected.value;
   if (id === null) return;
-  action(id).then(
-    () => store.setProblem(`box:${id}`, null),
-    (error) => store.setProblem(`box:${id}`, error.message),
-  );
+  void store.attempt(`box:${id}`, () => action(id));
 }
 
 /** @param {import("../store.js").Mode} mode */

@@ -23,12 +23,7 @@ function Card({ conflict }) {
   const keep = () => (store.conflict.value = null);
   const overrule = async () => {
     busy.value = true;
-    try {
-      await store.actions.overrule(yours);
-      store.setProblem(`box:${box_id}`, null);
-    } catch (error) {
-      store.setProblem(`box:${box_id}`, /** @type {Error} */ (error).message);
-    }
+    await store.attempt(`box:${box_id}`, () => store.actions.overrule(yours));
     busy.value = false;
   };
   return html`<section class="card conflict" aria-label="Conflict">

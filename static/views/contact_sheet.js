@@ -5,6 +5,7 @@ import { Icon } from "../lib/icon.js";
 import { niceStep, niceSteps } from "../lib/nice_step.js";
 import { useScrollPlace } from "../lib/scroll_place.js";
 import { html, useEffect, useLayoutEffect, useMemo, useRef, useState } from "../lib/view.js";
+import { WholeField } from "../lib/whole_field.js";
 import { actions, frame, frames, markFunction, markShape, mode, overlay, revision, selectedBox, shownBoxes } from "../store.js";
 import { AsExported } from "./as_exported.js";
 import { ContactLabels } from "./contact_labels.js";
@@ -177,13 +178,9 @@ function StepChooser({ step, count, onChange }) {
       type="range" min="0" max=${steps.length - 1} step="1" value=${near} aria-label="Frames apart" aria-valuetext=${`every ${step}`}
       onInput=${(/** @type {any} */ event) => onChange(steps[Number(event.currentTarget.value)])}
     />
-    <input
-      class="field number" type="number" min="1" max=${Math.max(1, count)} value=${step} aria-label="Every so many frames"
-      onChange=${(/** @type {any} */ event) => {
-        const asked = Math.round(Number(event.currentTarget.value));
-        if (asked >= 1 && asked <= count) onChange(asked);
-        event.currentTarget.value = String(asked >= 1 && asked <= count ? asked : step);
-      }}
+    <${WholeField}
+      label="Every so many frames" kind="number" least=${1} most=${Math.max(1, count)} value=${step}
+      onCommit=${(/** @type {number} */ asked) => asked >= 1 && asked <= count && onChange(asked)}
     />
     <span class="muted">frames</span>
   </div>`;

@@ -65,7 +65,7 @@ function SessionName() {
     busy.current = false;
   };
   return html`<input
-      class="session-name" aria-label="Name of the session" value=${name} maxlength="200"
+      class="session-name" aria-label="Name of the session" defaultValue=${name} maxlength="200"
       aria-invalid=${wrong.value !== null} ref=${focusWhole}
       onBlur=${(/** @type {any} */ event) => keep(event.currentTarget)}
       onKeyDown=${(/** @type {any} */ event) => {

@@ -158,6 +158,24 @@ def test_fewer_frames_and_larger_pictures(boxed_session, open_flatly) -> None:
         expect(tiles(page)).to_have_count(3)
 
 
+def test_what_is_typed_stays_while_the_sheet_changes(boxed_session, open_flatly) -> None:
+    with open_flatly(*boxed_session, **SMALL) as workspace:
+        page = workspace.page
+        page.keyboard.press("c")
+        seen = {label["box_id"] for label in workspace.answer("/frames/3/labels") if label["bbox"] is not None}
+        wait_for_boxes(page, 3, seen)
+        apart = page.get_by_label("Every so many frames")
+        apart.fill("4")
+        gone = min(seen)
+        revision = workspace.answer(f"/boxes/{gone}")["revision"]
+        address = f"/api/sessions/{workspace.sid}/boxes/{gone}"
+        assert workspace.client.delete(address, headers={"If-Match": f'"{revision}"'}).status_code == 204
+        wait_for_boxes(page, 3, seen - {gone})
+        assert apart.input_value() == "4"
+        apart.press("Enter")
+        expect(tiles(page)).to_have_count(3)
+
+
 @pytest.mark.parametrize("viewport", [{"width": 1280, "height": 720}, {"width": 700, "height": 600}])
 def test_only_what_is_in_sight_exists(boxed_session, open_flatly, viewport) -> None:
     with open_flatly(*boxed_session, viewport=viewport) as workspace:

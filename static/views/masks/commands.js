@@ -66,8 +66,5 @@ export function stepDrawing(which) {
 export function removeMask() {
   const mask = store.masksOfSelected.value.find(({ frame }) => frame === activeFrame());
   if (mask === undefined) return;
-  store.actions.deleteMask(mask.id).then(
-    () => store.setProblem("masks", null),
-    (error) => store.setProblem("masks", error.message),
-  );
+  void store.attempt("masks", () => store.actions.deleteMask(mask.id));
 }

@@ -37,12 +37,8 @@ export function MasksList({ subject }) {
     (a, b) => a.frame - b.frame,
   );
   const doubtful = masks.filter((mask) => !mask.accepted).length;
-  /** @param {Promise<void>} work */
-  const tried = (work) =>
-    work.then(
-      () => store.setProblem("masks", null),
-      (error) => store.setProblem("masks", error.message),
-    );
+  /** @param {() => Promise<void>} work */
+  const tried = (work) => store.attempt("masks", work);
   return html`<section class="panel-section masks-section" aria-label=${`Masks of ${subject.name}`}>
     <header class="section-head">
       <h2 class="heading cut" title=${subject.name}>Masks of ${subject.name}</h2>
@@ -76,14 +72,14 @@ function drawnIn({ polygons, open }) {
  * @param {Mask | null} props.mask null: it is being drawn, and nothing of it is stored
  * @param {string} props.color
  * @param {string} [props.refusal] why what is drawn is not stored
- * @param {(work: Promise<void>) => void} props.tried
+ * @param {(work: () => Promise<void>) => void} props.tried
  */
 function Row({ frame, polygons, mask, color, refusal, tried }) {
   const isDoubtful = mask !== null && !mask.accepted;
   const points = polygons.reduce((sum, { outer, holes }) => sum + outer.length + holes.reduce((all, hole) => all + hole.length, 0), 0);
   const origin = refusal !== undefined ? "not stored" : mask === null ? "drawing" : isDoubtful ? "proposed" : ORIGINS[mask.origin];
   /** @param {string} icon @param {string} label @param {() => Promise<void>} run */
-  const button = (icon, label, run) => html`<button class="row-button" aria-label=${label} title=${label} onClick=${() => tried(run())}><${Icon} name=${icon} size=${14} /></button>`;
+  const button = (icon, label, run) => html`<button class="row-button" aria-label=${label} title=${label} onClick=${() => tried(run)}><${Icon} name=${icon} size=${14} /></button>`;
   return html`<li class="mask-row" data-current=${frame === activeFrame()} data-doubtful=${isDoubtful || mask === null}>
     <button class="open" aria-current=${frame === activeFrame() ? "true" : undefined} title=${refusal ?? `Show frame ${frame}`} onClick=${() => openView(frame)}>
       <span class="swatch" style=${{ background: color }}></span>

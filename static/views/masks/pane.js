@@ -3,6 +3,7 @@
 import { Icon } from "../../lib/icon.js";
 import { MaskEditor } from "../../lib/mask_editor.js";
 import { html, useEffect, useLayoutEffect, useRef, useSignal, useState } from "../../lib/view.js";
+import { WholeField } from "../../lib/whole_field.js";
 import { actions, frames, overlay } from "../../store.js";
 import { drawing, LEAST_BRUSH, MOST_BRUSH } from "./drawing.js";
 import { PhotoLight } from "./photo_light.js";
@@ -118,25 +119,11 @@ export function MaskPane(props) {
 /** "Frame 10", which becomes a field where it is pressed. @param {{frame: number, onFrame: (frame: number) => void}} props */
 function FrameNumber({ frame, onFrame }) {
   const asking = useSignal(false);
-  const field = useRef(/** @type {HTMLInputElement | null} */ (null));
-  useLayoutEffect(() => {
-    if (asking.value) field.current?.select();
-  }, [asking.value]);
   if (!asking.value) return html`<button type="button" class="frame-number" title="Go to another frame" onClick=${() => (asking.value = true)}>Frame ${frame}</button>`;
-  const take = () => {
-    const asked = field.current?.valueAsNumber ?? NaN;
-    asking.value = false;
-    if (Number.isFinite(asked)) onFrame(Math.max(0, Math.min(frames.peek() - 1, Math.round(asked))));
-  };
   return html`<label class="frame-number">Frame
-    <input
-      ref=${field} class="field" type="number" min="0" max=${frames.value - 1} value=${frame} aria-label="Frame of this pane" onBlur=${() => asking.peek() && take()}
-      onKeyDown=${(/** @type {KeyboardEvent} */ event) => {
-        if (event.key === "Enter") take();
-        else if (event.key === "Escape") asking.value = false;
-        else return;
-        event.stopPropagation();
-      }}
+    <${WholeField}
+      label="Frame of this pane" least=${0} most=${frames.value - 1} value=${frame} onLeave=${() => (asking.value = false)}
+      onCommit=${(/** @type {number} */ asked) => onFrame(Math.max(0, Math.min(frames.peek() - 1, asked)))}
     />
   </label>`;
 }

@@ -3,6 +3,7 @@
 import { Icon } from "../../lib/icon.js";
 import { ImagePane } from "../../lib/image_pane.js";
 import { html, useEffect, useLayoutEffect, useRef, useState } from "../../lib/view.js";
+import { WholeField } from "../../lib/whole_field.js";
 import { actions, frames } from "../../store.js";
 import { corners, current, choose, mark, move } from "./corners.js";
 
@@ -81,13 +82,9 @@ export function PointsPane({ name, frame, other, active, onFrame, onActive, onSu
     <header>
       <button type="button" class="button quiet icon-only" aria-label="Previous frame" disabled=${frame <= 0} onClick=${() => onFrame(frame - 1)}><${Icon} name="chevron-left" /></button>
       <label class="row">Frame
-        <input
-          class="field frame" type="number" min="0" max=${count - 1} value=${frame} aria-label=${`Frame of the ${name.toLowerCase()} pane`}
-          onChange=${(/** @type {any} */ event) => {
-            const asked = Math.round(Number(event.currentTarget.value));
-            if (Number.isFinite(asked)) onFrame(Math.max(0, Math.min(count - 1, asked)));
-            event.currentTarget.value = String(frameNow.current);
-          }}
+        <${WholeField}
+          label=${`Frame of the ${name.toLowerCase()} pane`} kind="frame" least=${0} most=${count - 1} value=${frame}
+          onCommit=${(/** @type {number} */ asked) => onFrame(Math.max(0, Math.min(count - 1, asked)))}
         />
       </label>
       <button type="button" class="button quiet icon-only" aria-label="Next frame" disabled=${frame >= count - 1} onClick=${() => onFrame(frame + 1)}><${Icon} name="chevron-right" /></button>

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from playwright.sync_api import Route
 from scipy.spatial.transform import Rotation
 
 MUG = "mug"
@@ -110,6 +111,28 @@ def test_a_box_is_turned_and_nudged(open_workspace, mug):
         page.keyboard.press("ArrowRight")
         page.get_by_text("is locked").first.wait_for()
         assert workspace.revision() == 3
+
+
+def test_an_answer_that_comes_late_takes_no_newer_problem_away(open_workspace, mug):
+    sessions, sid, mug_id = mug
+    with open_workspace(sessions) as (_, _, page_of):
+        workspace = page_of(sid).open(f"#frame=4&box={mug_id}")
+        page = workspace.page
+        late = []
+
+        def keep_back(route: Route) -> None:
+            late.append((route, route.fetch()))
+
+        page.route("**/api/**/boxes/*", keep_back)
+        page.keyboard.press("k")
+        page.get_by_role("button", name="Unlock").first.wait_for()  # told over the live line
+        page.keyboard.press("ArrowRight")
+        page.get_by_text("is locked").first.wait_for()
+        workspace.until(lambda: late)
+        for route, response in late:
+            route.fulfill(response=response)
+        workspace.saved(1)
+        page.get_by_text("is locked").first.wait_for()
 
 
 def _place(box) -> tuple:
