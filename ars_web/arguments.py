@@ -49,6 +49,10 @@ Sessions = Annotated[
 Session = Annotated[str, typer.Argument(metavar="SESSION", help="A session's id or its unique name.")]
 OneBox = Annotated[int | None, typer.Option("--box", metavar="ID", min=0, help="This object alone.")]
 OneClass = Annotated[str | None, typer.Option("--class", metavar="NAME", help="The objects of this class alone.")]
+AzimuthBins = Annotated[
+    int, typer.Option("--azimuth-bins", metavar="N", min=1, max=360, help="Bins round the box's z axis.")
+]
+PolarBins = Annotated[int, typer.Option("--polar-bins", metavar="N", min=1, max=360, help="Bins from +z down to -z.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace the file where it exists.")]
 Name = Annotated[str | None, typer.Option("--name", metavar="NAME", help="The session's name; default: as it came.")]

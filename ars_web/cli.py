@@ -18,6 +18,7 @@ import typer
 from ars_web import arguments as take
 from ars_web import box_commands, class_commands, judging_commands, kernel_cache, label_commands, study_commands
 from ars_web.errors import ArsError
+from ars_web.option_groups import DatasetChoices, grouped
 from ars_web.terminal import (
     has_screen,
     note,
@@ -210,33 +211,16 @@ def list_sessions(sessions: take.Sessions = take.SESSIONS, as_json: take.Json = 
 
 
 @app.command()
+@grouped
 def export(
     session: take.Session,
     kind: take.DatasetFormat,
+    *,
     out: take.DatasetFolder = None,
-    frames_step: take.FramesStep = None,
-    frames_start: take.FramesStart = None,
-    frames_stop: take.FramesStop = None,
-    frames_list: take.FramesList = None,
-    frames_count: take.FramesCount = None,
-    frames_by: take.FramesBy = None,
-    frames_near_degrees: take.FramesNearDegrees = None,
-    frames_near_frames: take.FramesNearFrames = None,
-    frames_sector: take.FramesSector = None,
-    frames_sector_box: take.FramesSectorBox = None,
-    images: take.Images = None,
-    shape: take.Shape = None,
+    choices: DatasetChoices,
     masks: take.Masks = None,
-    min_visible: take.MinVisible = None,
-    max_truncated: take.MaxTruncated = None,
-    min_area_px: take.MinArea = None,
     heading_bins: take.HeadingBins = None,
-    split_train: take.SplitTrain = None,
-    split_val: take.SplitVal = None,
-    split_test: take.SplitTest = None,
-    split_by: take.SplitBy = None,
     split_hold_out: take.SplitHoldOut = None,
-    split_seed: take.SplitSeed = None,
     merge: take.Merge = None,
     executor: take.Executor = "local",
     tls_ca_file: take.TlsCaFile = None,
@@ -272,33 +256,13 @@ def export(
     cluster = cluster_at(executor, ca_file=tls_ca_file, cert=tls_cert, key=tls_key)
     with SessionStore(sessions) as store:
         ids = [store.find(name) for name in (session, *take.comma_separated(merge, "--merge"))]
-        given = {
-            "frames.step": frames_step,
-            "frames.start": frames_start,
-            "frames.stop": frames_stop,
-            "frames.list": take.whole_numbers(frames_list, "--frames-list") or None,
-            "frames.count": frames_count,
-            "frames.by": frames_by,
-            "frames.near_degrees": frames_near_degrees,
-            "frames.near_frames": frames_near_frames,
-            "frames.sector": take.number_range(frames_sector, "--frames-sector", example="0:180"),
-            "frames.sector_box": frames_sector_box,
-            "images": images,
-            "shape": shape,
+        own = {
             "masks": masks,
-            "min_visible": min_visible,
-            "max_truncated": max_truncated,
-            "min_area_px": min_area_px,
             "heading_bins": heading_bins,
-            "split.train": split_train,
-            "split.val": split_val,
-            "split.test": split_test,
-            "split.by": split_by,
             "split.hold_out": [store.find(name) for name in take.comma_separated(split_hold_out, "--split-hold-out")],
-            "split.seed": split_seed,
             "sessions": ids[1:],
         }
-        options = take.export_options(given)
+        options = take.export_options({**choices.given(), **own})
         snapshots = [store.snapshot(sid) for sid in ids]
     if dry_run:
         planned = (

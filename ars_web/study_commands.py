@@ -9,26 +9,20 @@ from typing import Annotated
 import typer
 
 from ars_web import arguments as take
+from ars_web.option_groups import DatasetChoices, ViewChoices, grouped
 from ars_web.terminal import print_json, print_table, write_json
 
 app = typer.Typer(rich_markup_mode=None)
 
 
 @app.command()
+@grouped
 def coverage(
     session: take.Session,
-    box: take.OneBox = None,
-    class_name: take.OneClass = None,
+    of: ViewChoices,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FILE", help="Write a picture (.png) or all numbers (.json).")
     ] = None,
-    azimuth_bins: Annotated[
-        int, typer.Option("--azimuth-bins", metavar="N", min=1, max=360, help="Bins round the box's z axis.")
-    ] = 36,
-    polar_bins: Annotated[
-        int, typer.Option("--polar-bins", metavar="N", min=1, max=360, help="Bins from +z down to -z.")
-    ] = 18,
-    shape: take.Shape = None,
     min_visible: take.MinVisible = None,
     sessions: take.Sessions = take.SESSIONS,
     as_json: take.Json = False,
@@ -39,25 +33,21 @@ def coverage(
     look alike count as one.
     """
     from ars_web.datasets.coverage import called, chosen_boxes, coverage_of, session_views
-    from ars_web.geometry.sphere_bins import SphereBins
     from ars_web.sessions.store import SessionStore
     from ars_web.studies.coverage_json import coverage_json
     from ars_web.studies.coverage_picture import coverage_png
 
     if out is not None and out.suffix.lower() not in (".png", ".json"):
         raise typer.BadParameter(f"{out} ends neither in .png nor in .json", param_hint="--out")
-    if box is not None and class_name is not None:
-        raise typer.BadParameter("give --box or --class, not both: a box is of one class", param_hint="--class")
     with SessionStore(sessions) as store:
         snapshot = store.snapshot(store.find(session))
-    bins = SphereBins(azimuth_bins, polar_bins)
-    options = take.export_options({"shape": shape, "min_visible": min_visible})
-    class_id = None if class_name is None else take.class_named(snapshot.state, class_name).id
-    chosen = chosen_boxes(snapshot, box_id=box, class_id=class_id)
+    options = take.export_options({"shape": of.shape, "min_visible": min_visible})
+    objects = of.objects(snapshot)
+    chosen = chosen_boxes(snapshot, **objects)
     views = session_views(snapshot, options)
-    found = coverage_of(views, bins, chosen)
+    found = coverage_of(views, of.bins, chosen)
     if out is not None and out.suffix.lower() == ".png":
-        title = f"{snapshot.state.name}: {called(snapshot, box_id=box, class_id=class_id)}"
+        title = f"{snapshot.state.name}: {called(snapshot, **objects)}"
         out.write_bytes(coverage_png(found, title=title))
     elif out is not None:
         write_json(out, coverage_json(found).model_dump(mode="json"))
@@ -65,14 +55,14 @@ def coverage(
         print_json(coverage_json(found).model_dump(mode="json"))
         return
     parts = [([place], {"box_id": views.box_ids[place]}) for place in chosen]
-    if box is None:
+    if of.box is None:
         parts += [
             ([place for place in chosen if views.class_ids[place] == one], {"class_id": one})
             for one in sorted({views.class_ids[place] for place in chosen})
         ]
     rows: list[tuple[object, ...]] = []
     for places, meant in parts:
-        of_part = coverage_of(views, bins, places)
+        of_part = coverage_of(views, of.bins, places)
         kind = "box" if "box_id" in meant else "class"
         name = called(snapshot, **meant)
         rows.append(
@@ -84,10 +74,10 @@ def coverage(
 
 
 @app.command()
+@grouped
 def tour(
     session: take.Session,
-    box: take.OneBox = None,
-    class_name: take.OneClass = None,
+    of: ViewChoices,
     count: Annotated[int, typer.Option("--count", metavar="N", min=1, max=2000, help="Views at most.")] = 20,
     distance: Annotated[
         str | None,
@@ -109,13 +99,6 @@ def tour(
             help="How much of an object is seen, in frames that count and in views; default: any, and half.",
         ),
     ] = None,
-    azimuth_bins: Annotated[
-        int, typer.Option("--azimuth-bins", metavar="N", min=1, max=360, help="Bins round the box's z axis.")
-    ] = 36,
-    polar_bins: Annotated[
-        int, typer.Option("--polar-bins", metavar="N", min=1, max=360, help="Bins from +z down to -z.")
-    ] = 18,
-    shape: take.Shape = None,
     start_frame: Annotated[
         int | None, typer.Option("--start-frame", metavar="N", min=0, help="Begin at this frame; default: the last.")
     ] = None,
@@ -143,7 +126,6 @@ def tour(
 
     from ars_web.datasets.coverage import chosen_boxes, session_views
     from ars_web.errors import BadInput
-    from ars_web.geometry.sphere_bins import SphereBins
     from ars_web.recordings.ars import camera_in_wrist
     from ars_web.sessions.store import SessionStore
     from ars_web.studies.tour import TourRequest, plan_tour, recorded_wrist
@@ -151,24 +133,21 @@ def tour(
 
     if out is not None and out.suffix.lower() not in (".json", ".txt"):
         raise typer.BadParameter(f"{out} ends neither in .json nor in .txt", param_hint="--out")
-    if box is not None and class_name is not None:
-        raise typer.BadParameter("give --box or --class, not both: a box is of one class", param_hint="--class")
     degrees = take.number_range(tilt, "--tilt")
     request = TourRequest(
-        bins=SphereBins(azimuth_bins, polar_bins),
+        bins=of.bins,
         count=count,
         distance=take.number_range(distance, "--distance"),
         height=take.number_range(height, "--height"),
         tilt=None if degrees is None else (math.radians(degrees[0]), math.radians(degrees[1])),
         min_visible=min_visible,
-        shape=shape,
+        shape=of.shape,
         start_frame=start_frame,
     )
     with SessionStore(sessions) as store:
         summary = store.summary(store.find(session))
         snapshot = store.snapshot(summary.id)
-    class_id = None if class_name is None else take.class_named(snapshot.state, class_name).id
-    chosen = chosen_boxes(snapshot, box_id=box, class_id=class_id)
+    chosen = chosen_boxes(snapshot, **of.objects(snapshot))
     if hand_eye is None:
         wrist = recorded_wrist(summary.format, Path(summary.source))
         T_wrist_camera, unknown = wrist.T_wrist_camera, wrist.unknown
@@ -210,34 +189,17 @@ def _percent(share: float) -> str:
 
 
 @app.command()
+@grouped
 def report(
     session: take.Session,
+    *,
     out: Annotated[
         Path | None,
         typer.Option(
             "--out", metavar="FILE.html", help="The page; default: the session's name and -report.html, here."
         ),
     ] = None,
-    frames_step: take.FramesStep = None,
-    frames_start: take.FramesStart = None,
-    frames_stop: take.FramesStop = None,
-    frames_list: take.FramesList = None,
-    frames_count: take.FramesCount = None,
-    frames_by: take.FramesBy = None,
-    frames_near_degrees: take.FramesNearDegrees = None,
-    frames_near_frames: take.FramesNearFrames = None,
-    frames_sector: take.FramesSector = None,
-    frames_sector_box: take.FramesSectorBox = None,
-    images: take.Images = None,
-    shape: take.Shape = None,
-    min_visible: take.MinVisible = None,
-    max_truncated: take.MaxTruncated = None,
-    min_area_px: take.MinArea = None,
-    split_train: take.SplitTrain = None,
-    split_val: take.SplitVal = None,
-    split_test: take.SplitTest = None,
-    split_by: take.SplitBy = None,
-    split_seed: take.SplitSeed = None,
+    choices: DatasetChoices,
     sessions: take.Sessions = take.SESSIONS,
     as_json: take.Json = False,
 ) -> None:
@@ -255,29 +217,7 @@ def report(
 
     if out is not None and out.suffix.lower() not in (".html", ".htm"):
         raise typer.BadParameter(f"{out} does not end in .html", param_hint="--out")
-    given = {
-        "frames.step": frames_step,
-        "frames.start": frames_start,
-        "frames.stop": frames_stop,
-        "frames.list": take.whole_numbers(frames_list, "--frames-list") or None,
-        "frames.count": frames_count,
-        "frames.by": frames_by,
-        "frames.near_degrees": frames_near_degrees,
-        "frames.near_frames": frames_near_frames,
-        "frames.sector": take.number_range(frames_sector, "--frames-sector", example="0:180"),
-        "frames.sector_box": frames_sector_box,
-        "images": images,
-        "shape": shape,
-        "min_visible": min_visible,
-        "max_truncated": max_truncated,
-        "min_area_px": min_area_px,
-        "split.train": split_train,
-        "split.val": split_val,
-        "split.test": split_test,
-        "split.by": split_by,
-        "split.seed": split_seed,
-    }
-    options = take.export_options(given)
+    options = take.export_options(choices.given())
     with SessionStore(sessions) as store:
         sid = store.find(session)
         snapshot, recorded = store.snapshot(sid), store.summary(sid)
