@@ -1431,7 +1431,7 @@ export interface paths {
         };
         /**
          * Read
-         * @description A report of the session as an export with these options would write it; each means what it means there.
+         * @description A report of the session as an export with these options would write it; one of several sessions has no report.
          *
          *     It comes in seconds also for long sessions: visible shares are then found in some thousand frames alone, unless
          *     `min_visible` needs them all.
@@ -13836,21 +13836,8 @@ export interface operations {
     "report-read": {
         parameters: {
             query?: {
-                /** @description every N-th frame */
-                frames_step?: number;
-                frames_start?: number;
-                /** @description default: to the end */
-                frames_stop?: number | null;
-                /** @description default: the hull where a box has one, else the box */
-                shape?: ("box" | "hull" | "mesh") | null;
-                min_visible?: number;
-                max_truncated?: number;
-                min_area_px?: number;
-                split_train?: number;
-                split_val?: number;
-                split_test?: number;
-                split_by?: "block" | "frame";
-                split_seed?: number;
+                /** @description those of an export, as the JSON text of what POST …/exports takes */
+                options?: string;
                 /** @description offer it as a file instead of showing it */
                 save?: boolean;
             };

@@ -287,10 +287,11 @@ export function coverageFrames(sid, of, counting, { by, index }, signal) {
 }
 
 /**
- * Where the report of a session is, a page of its own.
- * @param {string} sid
+ * Where the report of a session is, a page of its own: of what an export with these options would hold.
+ * @param {string} sid @param {Record<string, unknown>} options
  */
-export const reportAddress = (sid) => under(sid, "/report");
+export const reportAddress = (sid, options) =>
+  under(sid, Object.keys(options).length === 0 ? "/report" : `/report?${query({ options: JSON.stringify(options) })}`);
 
 /** @param {string} sid @param {Seen} of @param {Counting} counting @param {"json" | "png"} as */
 export const coverageAddress = (sid, of, counting, as) =>

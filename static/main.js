@@ -90,7 +90,7 @@ Object.assign(
     coverageOfObjects: async (counting, signal) => (await api.coverageOfObjects(sid(), counting, signal)).items,
     coverageFrames: (of, counting, direction, signal) => api.coverageFrames(sid(), of, counting, direction, signal),
     planTour: (wish) => api.planTour(sid(), wish),
-    reportAddress: () => api.reportAddress(sid()),
+    reportAddress: (options = {}) => api.reportAddress(sid(), options),
     coverageAddress: (of, counting, as) => api.coverageAddress(sid(), of, counting, as),
 
     formats: api.formats,

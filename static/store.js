@@ -306,7 +306,8 @@ export async function attempt(place, work) {
  * @property {(counting: Counting, signal?: AbortSignal) => Promise<readonly Schemas["ObjectCoverage"][]>} coverageOfObjects boxes, then classes
  * @property {(of: Seen, counting: Counting, direction: Direction, signal?: AbortSignal) => Promise<Schemas["BinFrames"]>} coverageFrames
  * @property {(of: Seen, counting: Counting, as: "json" | "png") => string} coverageAddress
- * @property {() => string} reportAddress  of the page that tells what an export would hold
+ * @property {(options?: Record<string, unknown>) => string} reportAddress
+ *   of the page that tells what an export with these options would hold
  * @property {(wish: object) => Promise<Tour>} planTour where to look next
  *
  * @property {() => Promise<Session[]>} sessions

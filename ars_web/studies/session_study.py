@@ -8,6 +8,7 @@ from jaxtyping import Float
 from ars_web.datasets.coverage import Coverage, SessionViews, coverage_of
 from ars_web.datasets.options import ExportOptions
 from ars_web.datasets.splits import SPLITS
+from ars_web.errors import BadInput
 from ars_web.geometry.sphere_bins import SphereBins
 from ars_web.geometry.view_directions import view_directions
 from ars_web.sessions.model import SessionSnapshot
@@ -59,8 +60,10 @@ def study_session(
     """Look at a session as an export with these options would write it.
 
     Raises:
-        BadInput: as `planned_labels` says.
+        BadInput: there are sessions to merge; and as `planned_labels` says.
     """
+    if options.sessions:
+        raise BadInput("a report is of one session: leave out the sessions to merge with it")
     labels = planned_labels(snapshot, options, visible_frames=visible_frames)
     centres = np.ascontiguousarray(labels.plan.frames.Ts_world_camera[:, :3, 3])
     boxes = [box for _, box in sorted(snapshot.state.boxes.items())]

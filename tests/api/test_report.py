@@ -1,5 +1,6 @@
 """A session's report over HTTP."""
 
+import json
 from typing import Any
 
 import httpx
@@ -33,12 +34,16 @@ def test_the_page_is_shown_in_a_sandbox_and_can_be_saved(client: httpx.Client, b
 
 
 def test_options_decide_what_it_tells_of(client: httpx.Client, boxed: str) -> None:
-    page = client.get(
-        f"{boxed}?frames_step=2&frames_start=1&shape=box&min_visible=0.1&split_train=0.6&split_val=0.4&split_by=frame"
-    ).text
+    options = {
+        "frames": {"step": 2, "start": 1, "near_frames": 1},
+        "shape": "box",
+        "min_visible": 0.1,
+        "split": {"train": 0.6, "val": 0.4, "by": "frame"},
+    }
+    page = client.get(boxed, params={"options": json.dumps(options)}).text
     assert (
-        "--frames-step 2 --frames-start 1 --shape box --min-visible 0.1 --split-train 0.6 --split-val 0.4"
-        " --split-by frame" in page
+        "--frames-step 2 --frames-start 1 --frames-near-frames 1 --shape box --min-visible 0.1 --split-train 0.6"
+        " --split-val 0.4 --split-by frame" in page
     )
     assert page.count("data:image/jpeg;base64,") == 3
 
@@ -50,18 +55,21 @@ def test_a_session_without_boxes_says_so(client: httpx.Client, sid: str) -> None
 
 
 @pytest.mark.parametrize(
-    ("query", "says"),
+    ("options", "says"),
     [
-        ("frames_start=99", "no frame is chosen"),
-        ("shape=mesh", "needs a mesh"),
-        ("split_train=0.5", "train + val + test must be 1, not 0.7"),
-        ("frames_step=0", "frames_step"),
-        ("min_visible=nan", "min_visible"),
-        ("split_by=session", "split_by"),
+        ('{"frames": {"start": 99}}', "no frame is chosen"),
+        ('{"shape": "mesh"}', "needs a mesh"),
+        ('{"split": {"train": 0.5}}', "train + val + test must be 1, not 0.7"),
+        ('{"frames": {"step": 0}}', "frames.step"),
+        ('{"min_visible": NaN}', "min_visible"),
+        ('{"split": {"by": "half"}}', "split.by"),
+        ('{"frame": {"step": 2}}', "options.frame"),
+        ('{"sessions": ["aaaaaaaaaaaa"]}', "a report is of one session"),
+        ("frames.step=2", "options: not JSON"),
     ],
 )
-def test_what_cannot_be_is_refused(client: httpx.Client, boxed: str, query: str, says: str) -> None:
-    answer = client.get(f"{boxed}?{query}")
+def test_what_cannot_be_is_refused(client: httpx.Client, boxed: str, options: str, says: str) -> None:
+    answer = client.get(boxed, params={"options": options})
     assert answer.status_code == 422
     assert answer.headers["content-type"] == "application/problem+json"
     assert says in answer.text

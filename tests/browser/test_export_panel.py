@@ -383,3 +383,16 @@ def test_frames_are_chosen_by_what_they_show_and_the_panel_says_what_they_cover(
         frames = job["options"]["frames"]
         assert (frames["count"], frames["near_frames"], frames["sector"]) == (4, 1, [0, 180])
         assert sum(split["images"] for split in job["report"]["splits"].values()) == chosen
+
+
+def test_the_report_is_of_the_options_that_are_set(boxed_session, open_flatly) -> None:
+    with open_flatly(*boxed_session) as workspace:
+        page = workspace.page
+        open_panel(page)
+        field(page, "Every N-th frame").fill("2")
+        with page.expect_popup() as opened:
+            page.get_by_role("link", name="Report", exact=True).click()
+        report = opened.value
+        expect(report.get_by_text("--frames-step 2").first).to_be_visible(timeout=60_000)
+        field(page, "Every N-th frame").fill("none")
+        expect(page.get_by_role("link", name="Report", exact=True)).to_have_count(0)

@@ -1,5 +1,6 @@
 /** The export panel: which dataset and how, and beside it what would be in it. */
 
+import { Icon } from "../../lib/icon.js";
 import { html, useEffect, useSignal } from "../../lib/view.js";
 import { actions } from "../../store.js";
 import { asked, changes, format, isSound, mistakes, offer, options, refusals, reset } from "./draft.js";
@@ -77,6 +78,7 @@ function Start() {
   const starting = useSignal(false);
   const problem = useSignal(/** @type {string | null} */ (null));
   const held = !isSound.value || refusals.value.size > 0 || format.value === "";
+  const merges = asked.value.sessions !== undefined; // a report is of one session
   const frames = isCurrent.value ? forecast.value?.frames : undefined;
   const start = async () => {
     if (held) return toWrong();
@@ -97,8 +99,14 @@ function Start() {
   return html`<footer class="start">
     ${problem.value !== null && html`<p class="problem" role="alert">${problem.value}</p>`}
     <p class="visually-hidden" role="status">${going > 0 ? `${many(going, "export")} running` : "No export is running"}</p>
-    <button class="button main" aria-disabled=${held || starting.value} onClick=${start}>
-      ${starting.value ? "Starting…" : frames === undefined ? "Start export" : `Export ${many(frames, "frame")}`}
-    </button>
+    <div class="row">
+      ${isSound.value &&
+      !merges &&
+      html`<a class="button" href=${actions.reportAddress(asked.value)} target="_blank" rel="noopener" title="What these options would write and what to mend first, on a page of its own">
+        <${Icon} name="clipboard-list" size=${14} />Report</a>`}
+      <button class="button main" aria-disabled=${held || starting.value} onClick=${start}>
+        ${starting.value ? "Starting…" : frames === undefined ? "Start export" : `Export ${many(frames, "frame")}`}
+      </button>
+    </div>
   </footer>`;
 }
