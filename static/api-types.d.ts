@@ -7848,6 +7848,12 @@ export interface operations {
     "coverage-frames-list": {
         parameters: {
             query?: {
+                /** @description a bin of equal angles, with `polar` */
+                azimuth?: number | null;
+                polar?: number | null;
+                /** @description or a cell of equal area */
+                cell?: number | null;
+                limit?: number;
                 /** @description one object; default: all of them together */
                 box_id?: number | null;
                 /** @description the objects of a class */
@@ -7858,12 +7864,6 @@ export interface operations {
                 min_visible?: number;
                 /** @description default: the hull where a box has one, else the box */
                 shape?: ("box" | "hull" | "mesh") | null;
-                /** @description a bin of equal angles, with `polar` */
-                azimuth?: number | null;
-                polar?: number | null;
-                /** @description or a cell of equal area */
-                cell?: number | null;
-                limit?: number;
             };
             header?: never;
             path: {

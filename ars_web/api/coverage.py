@@ -1,8 +1,9 @@
 """`/api/sessions/{sid}/coverage`: from where a session's objects are seen, and in which frames."""
 
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Depends, Query, Response
 from pydantic import BaseModel, Field
 
 from ars_web.api.dependencies import JsonResponse, ServicesDep, StrictRoute
@@ -27,6 +28,38 @@ MinVisible = Annotated[
     float,
     Query(ge=0.0, le=1.0, allow_inf_nan=False, description="views in which less of an object is seen do not count"),
 ]
+
+
+@dataclass(frozen=True)
+class Meant:
+    """Whose views are counted, of a query."""
+
+    box_id: BoxId = None
+    class_id: ClassId = None
+
+
+@dataclass(frozen=True)
+class Counting:
+    """How views are counted, of a query."""
+
+    azimuth_bins: Bins = 36
+    polar_bins: Bins = 18
+    min_visible: MinVisible = 0.0
+    shape: Shape = None
+
+    @property
+    def bins(self) -> SphereBins:
+        """Where views fall into."""
+        return SphereBins(self.azimuth_bins, self.polar_bins)
+
+    @property
+    def options(self) -> ExportOptions:
+        """Of an export that labels what is counted."""
+        return ExportOptions.model_validate({"min_visible": self.min_visible, "shape": self.shape})
+
+
+MeantDep = Annotated[Meant, Depends()]
+CountingDep = Annotated[Counting, Depends()]
 
 
 class ViewJson(BaseModel):
@@ -60,24 +93,14 @@ class ObjectsCoverage(BaseModel):
 
 
 @router.get("", operation_id="coverage-read", response_model=CoverageJson, responses=documented(404))
-def read(
-    sid: str,
-    services: ServicesDep,
-    box_id: BoxId = None,
-    class_id: ClassId = None,
-    azimuth_bins: Bins = 36,
-    polar_bins: Bins = 18,
-    min_visible: MinVisible = 0.0,
-    shape: Shape = None,
-) -> Response:
+def read(sid: str, services: ServicesDep, meant: MeantDep, by: CountingDep) -> Response:
     """The paper's histogram of viewpoints, and one with cells of equal area.
 
     A frame counts where an export with these options would label the object. Views that a class's symmetry makes look
     alike count as one, in the bin that stands for them all.
     """
-    bins = SphereBins(azimuth_bins, polar_bins)
-    _, views, rows = _views(services, sid, box_id, class_id, min_visible, shape)
-    return JsonResponse(coverage_json(coverage_of(views, bins, rows)).model_dump(mode="json"))
+    _, views, rows = _views(services, sid, meant, by)
+    return JsonResponse(coverage_json(coverage_of(views, by.bins, rows)).model_dump(mode="json"))
 
 
 @router.get(
@@ -86,21 +109,11 @@ def read(
     response_class=Response,
     responses={200: {"description": "the histograms as PNG", "content": {"image/png": {}}}, **documented(404)},
 )
-def picture(
-    sid: str,
-    services: ServicesDep,
-    box_id: BoxId = None,
-    class_id: ClassId = None,
-    azimuth_bins: Bins = 36,
-    polar_bins: Bins = 18,
-    min_visible: MinVisible = 0.0,
-    shape: Shape = None,
-) -> Response:
+def picture(sid: str, services: ServicesDep, meant: MeantDep, by: CountingDep) -> Response:
     """The same as a picture, for a paper or a notebook."""
-    bins = SphereBins(azimuth_bins, polar_bins)
-    snapshot, views, rows = _views(services, sid, box_id, class_id, min_visible, shape)
-    title = called(snapshot, box_id=box_id, class_id=class_id)
-    drawn = coverage_png(coverage_of(views, bins, rows), title=title)
+    snapshot, views, rows = _views(services, sid, meant, by)
+    title = called(snapshot, box_id=meant.box_id, class_id=meant.class_id)
+    drawn = coverage_png(coverage_of(views, by.bins, rows), title=title)
     return Response(drawn, media_type="image/png", headers={"Cache-Control": "private, no-cache"})
 
 
@@ -108,25 +121,21 @@ def picture(
 def frames(
     sid: str,
     services: ServicesDep,
-    box_id: BoxId = None,
-    class_id: ClassId = None,
-    azimuth_bins: Bins = 36,
-    polar_bins: Bins = 18,
-    min_visible: MinVisible = 0.0,
-    shape: Shape = None,
+    meant: MeantDep,
+    by: CountingDep,
     azimuth: Annotated[int | None, Query(ge=0, lt=MOST_BINS, description="a bin of equal angles, with `polar`")] = None,
     polar: Annotated[int | None, Query(ge=0, lt=MOST_BINS)] = None,
     cell: Annotated[int | None, Query(ge=0, lt=MOST_BINS**2, description="or a cell of equal area")] = None,
     limit: Annotated[int, Query(ge=1, le=10_000)] = 200,
 ) -> Response:
     """The frames that see an object from one bin."""
-    bins = SphereBins(azimuth_bins, polar_bins)
+    bins = by.bins
     if (azimuth is None) != (polar is None) or (cell is None) == (azimuth is None):
         raise BadInput("give azimuth and polar of a bin of equal angles, or a cell of equal area")
     if azimuth is not None and polar is not None and not (azimuth < bins.azimuth and polar < bins.polar):
         raise BadInput(f"there is no bin {azimuth}, {polar} among {bins.azimuth} x {bins.polar}; they count from 0")
     angle = None if azimuth is None or polar is None else azimuth * bins.polar + polar
-    _, views, rows = _views(services, sid, box_id, class_id, min_visible, shape)
+    _, views, rows = _views(services, sid, meant, by)
     found = frames_in_bin(views, bins, rows, angle=angle, cell=cell)
     count = min(limit, len(found))
     spread = [found[(2 * i + 1) * len(found) // (2 * count)] for i in range(count)]
@@ -135,19 +144,11 @@ def frames(
 
 
 @router.get("/objects", operation_id="coverage-objects-list", response_model=ObjectsCoverage, responses=documented(404))
-def objects(
-    sid: str,
-    services: ServicesDep,
-    azimuth_bins: Bins = 36,
-    polar_bins: Bins = 18,
-    min_visible: MinVisible = 0.0,
-    shape: Shape = None,
-) -> Response:
+def objects(sid: str, services: ServicesDep, by: CountingDep) -> Response:
     """How much is seen of each object and class: where a recording lacks most. Empty where there is no box."""
-    bins = SphereBins(azimuth_bins, polar_bins)
     if not services.store.snapshot(sid).state.boxes:
         return JsonResponse({"items": []})
-    _, views, rows = _views(services, sid, None, None, min_visible, shape)
+    _, views, rows = _views(services, sid, Meant(), by)
     chosen: list[tuple[int, int | None, list[int]]] = [
         (views.class_ids[row], views.box_ids[row], [row]) for row in rows
     ]
@@ -155,7 +156,7 @@ def objects(
         chosen.append((class_id, None, [row for row in rows if views.class_ids[row] == class_id]))
     items: list[dict[str, int | float | None]] = []
     for class_id, box_id, of in chosen:
-        found = coverage_of(views, bins, of)
+        found = coverage_of(views, by.bins, of)
         items.append(
             {
                 "class_id": class_id,
@@ -169,9 +170,8 @@ def objects(
 
 
 def _views(
-    services: ServicesDep, sid: str, box_id: int | None, class_id: int | None, min_visible: float, shape: str | None
+    services: ServicesDep, sid: str, meant: Meant, by: Counting
 ) -> tuple[SessionSnapshot, SessionViews, list[int]]:
     snapshot = services.store.snapshot(sid)
-    options = ExportOptions.model_validate({"min_visible": min_visible, "shape": shape})
-    rows = chosen_boxes(snapshot, box_id=box_id, class_id=class_id)
-    return snapshot, services.views.find(snapshot, options), rows
+    rows = chosen_boxes(snapshot, box_id=meant.box_id, class_id=meant.class_id)
+    return snapshot, services.views.find(snapshot, by.options), rows
