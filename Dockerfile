@@ -33,7 +33,11 @@ ENV PATH=/opt/ars-web/bin:$PATH \
 USER ars
 WORKDIR /sessions
 # Shows that the image works, and leaves the compiled kernels for the first real use.
-RUN ars-web demo --no-serve --sessions /tmp/demo && rm -r /tmp/demo && ars-web check
+RUN ars-web demo --no-serve --sessions /tmp/demo \
+    && ars-web tour demo --sessions /tmp/demo \
+    && ars-web report demo --sessions /tmp/demo --out /tmp/demo/report.html \
+    && rm -r /tmp/demo \
+    && ars-web check
 VOLUME /sessions
 EXPOSE 8000
 HEALTHCHECK --interval=30s --timeout=5s --start-period=20s \
