@@ -171,7 +171,11 @@ FramesSector = Annotated[
 ]
 FramesSectorBox = Annotated[
     int | None,
-    typer.Option("--frames-sector-box", metavar="ID", help="Angles round this box; default: the middle of all."),
+    typer.Option(
+        "--frames-sector-box",
+        metavar="ID",
+        help="Angles as this box's coverage has them; default: about the world's z, round all.",
+    ),
 ]
 Images = Annotated[
     Literal["link", "copy", "rectify", "none"] | None,

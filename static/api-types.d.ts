@@ -2627,7 +2627,7 @@ export interface components {
             near_frames: number;
             /**
              * Cameras from one side
-             * @description only cameras between two angles round the objects, in degrees about the world's z axis: 0 to 180 is half the sphere; empty: all round
+             * @description only cameras between two angles round the objects, in degrees: 0 to 180 is half the sphere; empty: all round
              */
             sector?: [
                 number,
@@ -2635,7 +2635,7 @@ export interface components {
             ] | null;
             /**
              * Angles round box
-             * @description id of the box that they are about; empty: the middle of all boxes
+             * @description id of the box whose own z axis they are about, as in its coverage; empty: the world's z axis, through the middle of all boxes
              */
             sector_box?: number | null;
         };

@@ -138,7 +138,8 @@ def _in_sector(
 
 
 def _azimuths(snapshot: SessionSnapshot, rows: Int[np.ndarray, "n"], box_id: int | None) -> Float[np.ndarray, "n"]:
-    """Of the cameras of some frames, in degrees, about a box or the middle of all.
+    """Of the cameras of some frames, in degrees: in a box's own frame, as its coverage has them, or in the world's
+    axes about the middle of all boxes.
 
     Raises:
         BadInput: the session has no box.
@@ -149,8 +150,12 @@ def _azimuths(snapshot: SessionSnapshot, rows: Int[np.ndarray, "n"], box_id: int
         raise BadInput(f"session {snapshot.id} has no box that a sector of views could be round; make one first")
     if box_id is not None and box_id not in boxes:
         raise NotFound(f"session {snapshot.id} has no box {box_id} that a sector of views could be round")
-    centres = [box.box.T_world_box[:3, 3] for i, box in sorted(boxes.items()) if box_id in (None, i)]
-    return azimuths_round(snapshot.frames.Ts_world_camera[rows, :3, 3], np.mean(centres, axis=0))
+    if box_id is not None:
+        T_world_about = boxes[box_id].box.T_world_box
+    else:
+        T_world_about = np.eye(4)
+        T_world_about[:3, 3] = np.mean([box.box.T_world_box[:3, 3] for _, box in sorted(boxes.items())], axis=0)
+    return azimuths_round(snapshot.frames.Ts_world_camera[rows, :3, 3], T_world_about)
 
 
 def _as_written(snapshot: SessionSnapshot, options: ExportOptions) -> SessionSnapshot:

@@ -76,11 +76,14 @@ class FrameChoice(_Strict):
     sector: tuple[Degrees, Degrees] | None = Field(
         None,
         title="Cameras from one side",
-        description="only cameras between two angles round the objects, in degrees about the world's z axis:"
-        " 0 to 180 is half the sphere; empty: all round",
+        description="only cameras between two angles round the objects, in degrees: 0 to 180 is half the sphere;"
+        " empty: all round",
     )
     sector_box: Count | None = Field(
-        None, title="Angles round box", description="id of the box that they are about; empty: the middle of all boxes"
+        None,
+        title="Angles round box",
+        description="id of the box whose own z axis they are about, as in its coverage; empty: the world's z axis,"
+        " through the middle of all boxes",
     )
 
     @model_validator(mode="after")

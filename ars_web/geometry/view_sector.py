@@ -1,4 +1,4 @@
-"""From which side cameras stand round something: azimuths about the world's z axis, and sectors of them."""
+"""From which side cameras stand round something: azimuths about the z axis of a frame, and sectors of them."""
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -9,12 +9,14 @@ _DIGITS = 9
 """Of an azimuth in degrees. Cameras that stand exactly on a sector's edge are on the same side of it everywhere."""
 
 
-def azimuths_round(centres_world: Float[np.ndarray, "n 3"], about: Float[np.ndarray, "3"]) -> Float[np.ndarray, "n"]:
-    """Degrees in [0, 360) from the world's x axis to each camera, seen from above `about`.
+def azimuths_round(
+    centres_world: Float[np.ndarray, "n 3"], T_world_about: Float[np.ndarray, "4 4"]
+) -> Float[np.ndarray, "n"]:
+    """Degrees in [0, 360) from the x axis of the frame `about` to each camera, seen from its positive z.
 
-    NaN for a camera straight above or below it, or exactly there.
+    NaN for a camera exactly on its z axis.
     """
-    x, y = (centres_world[:, axis] - about[axis] for axis in (0, 1))
+    x, y = ((centres_world - T_world_about[:3, 3]) @ T_world_about[:3, :2]).T
     degrees = np.round(np.degrees(np.arctan2(y, x)), _DIGITS) % TURN
     return np.where((x == 0.0) & (y == 0.0), np.nan, degrees)
 

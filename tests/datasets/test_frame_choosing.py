@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from ars_web.datasets.coverage import session_views
+from ars_web.datasets.coverage import frames_in_bin, session_views
 from ars_web.datasets.forecast import Forecast, forecast
 from ars_web.datasets.frame_choosing import choose_frames, directions_in_frames
 from ars_web.datasets.options import ExportOptions
@@ -20,6 +20,7 @@ from ars_web.errors import BadInput, NotFound
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box
 from ars_web.geometry.frame_selection import NOTHING, covered, evenly
+from ars_web.geometry.sphere_bins import SphereBins
 from ars_web.sessions.model import SessionSnapshot
 
 Make = Callable[..., SessionSnapshot]
@@ -138,6 +139,24 @@ def test_a_sector_is_round_the_middle_of_the_boxes_or_one_of_them(make_snapshot:
     assert len(plan_of(snapshot, out=tmp_path / "d", frames={**right, "sector_box": 1}).frames) == 18
     with pytest.raises(NotFound, match="session s1 has no box 7"):
         plan_of(snapshot, out=tmp_path / "d", frames={**right, "sector_box": 7})
+
+
+def test_a_sector_round_a_box_is_counted_as_its_coverage_is(make_snapshot: Make, tmp_path: Path) -> None:
+    # The box lies on its side, as in a world whose z axis is not up.
+    T_world_box = np.eye(4)
+    T_world_box[:3, :3] = [[0, 0, 1], [1, 0, 0], [0, 1, 0]]
+    snapshot = make_snapshot(36, objects=[Box(T_world_box, np.full(3, 0.2))], one_camera=True)
+    snapshot = standing(snapshot, np.arange(36) * 10.0)
+    plan = plan_of(snapshot, out=tmp_path / "d", frames={"sector": [0, 90], "sector_box": 1})
+    bins, seen = SphereBins(36, 18), session_views(snapshot, options())
+    inside = {
+        frame
+        for azimuth in range(18, 27)  # the bins count from -180 degrees
+        for polar in range(18)
+        for frame, _ in frames_in_bin(seen, bins, [0], angle=azimuth * 18 + polar)
+    }
+    assert set(plan.frames.index.tolist()) == inside
+    assert 0 < len(inside) < 36
 
 
 def test_frames_of_merged_sessions_are_chosen_together(make_snapshot: Make, tmp_path: Path) -> None:
