@@ -107,7 +107,8 @@ def dots(directions: Float[np.ndarray, "n 3"], *, radius: float, sides: int = 8)
 
 
 def outlines(patches: Iterable[Float[np.ndarray, "4"]]) -> Float[np.ndarray, "m 2 3"]:
-    """The sides of patches, as segments between points of the unit sphere."""
+    """The sides of patches, as segments between points of the unit sphere; without those that two of them share, such
+    as between the bins of a ring that a symmetry makes one."""
     segments = [np.zeros((0, 2, 3))]
     for left, right, top, bottom in patches:
         sides = [(phi, phi, top, bottom) for phi in (left, right) if right - left < 2 * np.pi - 1e-9]
@@ -116,7 +117,11 @@ def outlines(patches: Iterable[Float[np.ndarray, "4"]]) -> Float[np.ndarray, "m 
             steps = 1 + max(1, int(np.ceil(max(phi1 - phi0, theta1 - theta0) / (STEP / 2))))
             line = _on_sphere(np.linspace(phi0, phi1, steps), np.linspace(theta0, theta1, steps))
             segments.append(np.stack([line[:-1], line[1:]], axis=1))
-    return np.concatenate(segments)
+    found = np.concatenate(segments)
+    # By their middles, since those that are shared run either way, and differ by rounding where the way round closes.
+    middles = (1e6 * found.mean(axis=1)).round().astype(int)
+    _, which, times = np.unique(middles, axis=0, return_inverse=True, return_counts=True)
+    return found[times[which.ravel()] == 1]
 
 
 def _on_sphere(phi: np.ndarray, theta: np.ndarray) -> np.ndarray:

@@ -52,7 +52,9 @@ export function ClassEditor({ one, anchor, onClose }) {
     const wanted = name.value?.trim() ?? one.name;
     if (wanted === one.name) return void (name.value = null);
     if (wanted === "") return void (problem.value = { at: "name", text: "A class needs a name." });
-    if (await tried("name", store.actions.changeClass(one.id, { name: wanted }))) name.value = null;
+    const typed = name.value;
+    // What is typed while the answer is awaited stays.
+    if ((await tried("name", store.actions.changeClass(one.id, { name: wanted }))) && name.value === typed) name.value = null;
   };
   /** @param {string} color */
   const recolour = (color) => void tried("colour", store.actions.changeClass(one.id, { color }));
@@ -118,7 +120,8 @@ function UsualSize({ one, resize }) {
     const bad = sides.find((side) => !side.ok || side.value <= 0);
     if (bad !== undefined) return void (problem.value = bad.ok ? "A side is longer than 0 mm." : bad.problem);
     const size = /** @type {Triple} */ (sides.map((side) => (side.ok ? side.value : NaN)));
-    if (await resize(size)) drafts.value = [null, null, null];
+    const typed = drafts.value;
+    if ((await resize(size)) && drafts.value === typed) drafts.value = [null, null, null];
   };
   return html`<div class="line" role="group" aria-label="Usual size, mm"><span class="muted">Size mm</span>
       <span class="sides">

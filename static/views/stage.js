@@ -118,8 +118,8 @@ function Overlays() {
           onInput=${(/** @type {any} */ event) => (store.blend.value = Number(event.currentTarget.value))}
         />
       </label>`}
-      ${store.mode.value === "coverage" && store.selected.value !== null &&
-      html`<button class="chip button" onClick=${command("look-selected").run} title="Look at the selected object (L)">Look closer</button>`}
+      ${store.mode.value === "coverage" && store.sphereBox.value !== null &&
+      html`<button class="chip button" onClick=${lookCloser} title="Look at the object inside the sphere (L, once it is selected)">Look closer</button>`}
       <button class="chip button" aria-pressed=${store.snapLength.value > 0 || store.snapAngle.value > 0} onClick=${command("snap").run} title="Snap (N)">
         ${snapWords()}
       </button>
@@ -132,6 +132,13 @@ function Overlays() {
       <button class="button quiet icon-only" aria-label="Dismiss" onClick=${() => store.setProblem("scene", null)}><${Icon} name="x" /></button>
     </div>`}
   `;
+}
+
+/** Coverage looks at the first object where none is selected, and at a class's by one of them. */
+function lookCloser() {
+  const box = store.sphereBox.peek();
+  if (box !== store.selected.peek()) store.actions.select(box);
+  command("look-selected").run();
 }
 
 /** How far a jump can go. */

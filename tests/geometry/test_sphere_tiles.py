@@ -73,6 +73,26 @@ def test_outlines_run_along_the_sides_and_not_through_a_pole() -> None:
     assert len(outlines([])) == 0
 
 
+def test_what_several_patches_outline_together_has_no_lines_within() -> None:
+    bins = SphereBins(18, 9)
+    ring = bin_patches(bins)[2::9]
+    assert len(ring) == 18
+    heights = np.degrees(np.arccos(outlines(ring)[..., 2]))
+    assert np.allclose(heights[:, 0], heights[:, 1])
+    assert set(heights.round().ravel().tolist()) == {40.0, 60.0}
+    pair = outlines(bin_patches(bins)[[4, 13]])
+    assert len(pair) == 2 * len(outlines(bin_patches(bins)[[4]])) - 2 * len(shared_side(pair, bins))
+
+
+def shared_side(outline: np.ndarray, bins: SphereBins) -> np.ndarray:
+    """The segments of the side between the first two bins of the equator; none of them may be in an outline of both."""
+    left = outlines(bin_patches(bins)[[4]])
+    side = left[np.isclose(np.degrees(np.arctan2(left[..., 1], left[..., 0])), -160.0).all(axis=1)]
+    assert len(side) > 0
+    assert not any(np.allclose(segment, one) for segment in outline for one in side)
+    return side
+
+
 def test_a_bin_that_is_folded_shows_the_one_that_it_is_folded_to() -> None:
     bins = SphereBins(18, 9)
     for found in stand_ins(bins):

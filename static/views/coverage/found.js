@@ -68,8 +68,8 @@ class Answer {
 export const coverage = /** @type {Answer<Coverage>} */ (new Answer());
 /** Of all objects and classes. */
 export const objects = /** @type {Answer<readonly ObjectCoverage[]>} */ (new Answer());
-/** Of the chosen direction. */
-export const binFrames = /** @type {Answer<BinFrames>} */ (new Answer());
+/** Of the chosen direction; `of`: the one that was asked about. */
+export const binFrames = /** @type {Answer<BinFrames & {of: import("../../store.js").Direction}>} */ (new Answer());
 
 /** What all answers depend on: a line that comes back may have missed an edit that is not told yet. */
 function state() {
@@ -97,6 +97,6 @@ export function useBinFrames() {
   binFrames.use(() => {
     const [of, how, where] = [seen.value, counting.value, direction.value];
     state();
-    return of === null || where === null ? null : (stop) => actions.coverageFrames(of, how, where, stop);
+    return of === null || where === null ? null : async (stop) => ({ ...(await actions.coverageFrames(of, how, where, stop)), of: where });
   }, 0);
 }

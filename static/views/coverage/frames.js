@@ -13,7 +13,10 @@ export function BinFramesView() {
   const list = useRef(/** @type {HTMLElement | null} */ (null));
   const at = useSignal(0);
   if (store.direction.value === null) return html`<${NothingChosen} />`;
-  const found = binFrames.value.value;
+  const { by, index } = store.direction.value;
+  const last = binFrames.value.value;
+  // What is known of another direction says nothing about this one.
+  const found = last !== null && last.of.by === by && last.of.index === index ? last : null;
   const problem = binFrames.problem.value;
   const items = found?.items ?? [];
   const active = Math.max(0, Math.min(items.length - 1, at.value));
@@ -36,6 +39,7 @@ export function BinFramesView() {
     </header>
     ${problem !== null &&
     html`<p class="problem" role="alert">${problem} <button class="button" onClick=${() => binFrames.retry()}>Try again</button></p>`}
+    ${problem === null && found === null && html`<p class="muted teach" role="status">Looking for its frames…</p>`}
     ${problem === null && found !== null && found.total === 0 &&
     html`<p class="muted teach">No frame sees it from this direction. Film it from there, or let <strong>Plan views</strong> on the right say where to stand.</p>`}
     <ul class="tiles" ref=${list} onKeyDown=${keys} data-stale=${!binFrames.isCurrent.value}>
@@ -61,7 +65,7 @@ function NothingChosen() {
   return html`<section class="bin-frames" aria-label="Frames from this direction">
     <div class="teach">
       <p>Each bin is a direction to look at the object from. The brighter it is, the more frames do.</p>
-      <p class="muted">Click one, here or on the sphere, and its frames are shown. Orange dots are directions that no frame has.</p>
+      <p class="muted">Click one, here or on the sphere, and its frames are shown. A dot marks a direction that no frame has.</p>
     </div>
   </section>`;
 }

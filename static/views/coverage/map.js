@@ -1,7 +1,7 @@
 /** The heat map: every direction round an object as a map of the sphere, hot where it is seen, holes marked. */
 
 import { html, useEffect, useMemo, useRef, useSignal } from "../../lib/view.js";
-import { byArea, direction } from "../../store.js";
+import { binsOf, byArea, counting, direction } from "../../store.js";
 import { areaWords, countWords, heat, placeWords, rowsOf } from "./bins.js";
 
 /** @typedef {import("./bins.js").Bin} Bin */
@@ -25,7 +25,9 @@ export function HeatMap({ coverage, stale, name }) {
   const focused = useSignal(false);
 
   const all = useMemo(() => new Map(rows.flat().map((bin) => [bin.index, bin])), [rows]);
-  const chosen = direction.value?.by === by ? (all.get(direction.value.index) ?? null) : null;
+  // Until bins of another size are counted, those that are shown have no place among the ones asked for.
+  const isOther = coverage.counts.length !== binsOf(counting.value).azimuth_bins;
+  const chosen = direction.value?.by === by && !isOther ? (all.get(direction.value.index) ?? null) : null;
   const at = all.get(active.value ?? -1) ?? chosen ?? rows[Math.floor(rows.length / 2)][0];
   const read = all.get(hovered.value ?? -1) ?? (focused.value ? at : chosen);
   useEffect(() => {
@@ -42,7 +44,7 @@ export function HeatMap({ coverage, stale, name }) {
   /** @param {Bin} bin */
   const choose = (bin) => {
     active.value = bin.index;
-    if (bin.reachable) direction.value = { by, index: bin.index };
+    if (bin.reachable && !isOther) direction.value = { by, index: bin.index };
   };
   /** @param {KeyboardEvent} event */
   const keys = (event) => {
@@ -63,7 +65,7 @@ export function HeatMap({ coverage, stale, name }) {
     return cell === null ? null : Number(cell.getAttribute("data-index"));
   };
 
-  return html`<div class="heat-map" data-stale=${stale}>
+  return html`<div class="heat-map" data-stale=${stale} data-other=${isOther}>
     <svg
       ref=${grid} viewBox="-212 -5 398 200" role="grid" aria-label=${`Views of ${name} by direction`} aria-busy=${stale}
       onKeyDown=${keys} onPointerOver=${(/** @type {Event} */ event) => (hovered.value = under(event))} onPointerLeave=${() => (hovered.value = null)}
@@ -91,7 +93,7 @@ export function HeatMap({ coverage, stale, name }) {
       )}
       <g class="dots" aria-hidden="true">
         ${rows.flat().filter(({ count, reachable }) => reachable && count === 0).map(
-          (bin) => html`<circle key=${`${by} ${bin.index}`} cx=${(bin.left + bin.right) / 2} cy=${(bin.top + bin.bottom) / 2} r=${Math.min(DOT, (bin.bottom - bin.top) / 5)} />`,
+          (bin) => html`<circle key=${`${by} ${bin.index}`} cx=${(bin.left + bin.right) / 2} cy=${(bin.top + bin.bottom) / 2} r=${Math.min(DOT, (bin.bottom - bin.top) / 7)} />`,
         )}
       </g>
       ${chosen !== null && html`<${Ring} bin=${chosen} kind="chosen" />`}
@@ -101,10 +103,12 @@ export function HeatMap({ coverage, stale, name }) {
         ${DOWN.map(([value, words]) => html`<text key=${value} x="-184" y=${value === 0 ? 8 : value === 180 ? 178 : 93} text-anchor="end">${words}</text>`)}
       </g>
     </svg>
-    <p class="reading" role="status">${read === null
+    <p class="reading" role="status">${isOther
+      ? html`<span class="muted">Counting the views…</span>`
+      : read === null
       ? html`<span class="muted">Arrow keys walk the bins; Enter or a click shows frames.</span>`
       : html`<strong>${countWords(read)}</strong> <span class="muted">${placeWords(read)}<span class="area"> · ${areaWords(read)}</span></span>`}</p>
-    <${Legend} most=${most} hasFolded=${rows.flat().some(({ reachable }) => !reachable)} />
+    <${Legend} most=${most} isSeen=${coverage.views > 0} hasFolded=${rows.flat().some(({ reachable }) => !reachable)} />
   </div>`;
 }
 
@@ -114,10 +118,10 @@ function Ring({ bin, kind }) {
   return html`<g class=${`ring ${kind}`} aria-hidden="true"><rect class="halo" ...${place} /><rect ...${place} /></g>`;
 }
 
-/** @param {{most: number, hasFolded: boolean}} props */
-function Legend({ most, hasFolded }) {
+/** @param {{most: number, isSeen: boolean, hasFolded: boolean}} props */
+function Legend({ most, isSeen, hasFolded }) {
   return html`<div class="legend" role="group" aria-label="What the colours mean">
-    <span>${most === 1 ? "" : "1"}</span><span class="ramp" data-flat=${most === 1}></span><span>${most.toLocaleString("en")} ${most === 1 ? "view" : "views"}</span>
+    ${isSeen && html`${most > 1 && html`<span>1</span>`}<span class="ramp" data-flat=${most === 1}></span><span>${most.toLocaleString("en")} ${most === 1 ? "view" : "views"}</span>`}
     <span class="key"><span class="hole"></span>no view</span>
     ${hasFolded && html`<span class="key"><span class="folded"></span>looks the same elsewhere</span>`}
   </div>`;

@@ -57,11 +57,18 @@ export function NextViews() {
         </div>
         <${Mistake} key=${`${name}-mistake`} of=${name} />`,
     )}
-    ${problem.value !== null && html`<p class="problem" role="alert">${problem.value}</p>`}
+    ${problem.value !== null && html`<${Refused} text=${problem.value} />`}
     ${plan.value === null
       ? html`<p class="muted small">Where nothing is given, views stay as far away and as high as the recorded frames.</p>`
       : html`<${Result} tour=${plan.value.tour} stale=${plan.value.revision !== store.revision.value} />`}
   </section>`;
+}
+
+/** Why there is no plan, where the button that asked for one may have left it out of sight. @param {{text: string}} props */
+function Refused({ text }) {
+  const root = useRef(/** @type {HTMLElement | null} */ (null));
+  useEffect(() => root.current?.scrollIntoView({ block: "nearest" }), [text]);
+  return html`<p class="problem" role="alert" ref=${root}>${text}</p>`;
 }
 
 /** @param {{of: "count" | LimitName}} props */

@@ -45,8 +45,12 @@ function Numbers() {
   return html`<section class="panel-section coverage-numbers" aria-label="How much is seen" data-stale=${!coverage.isCurrent.value}>
     <dl>${facts.map(([name, value]) => html`<div key=${name}><dt>${name}</dt><dd data-number=${name.toLowerCase()}>${value}</dd></div>`)}</dl>
     <p class="muted">${found.views === 0
-      ? "No frame shows it as asked. Ask for less of it to be visible, or move its box to where the cameras look."
-      : `From ${percent(unseen)} of all directions no frame sees it.`}</p>
+      ? store.counting.value.min_visible > 0
+        ? "No frame shows so much of it. Ask for less of it to be visible, or move its box to where the cameras look."
+        : "No frame shows it. Move its box to where the cameras look."
+      : unseen === 0
+        ? "Frames see it from every direction."
+        : `From ${percent(unseen)} of all directions no frame sees it.`}</p>
   </section>`;
 }
 

@@ -1,6 +1,6 @@
 """Classes: adding, changing and deleting them."""
 
-from playwright.sync_api import expect
+from playwright.sync_api import Route, expect
 
 
 def test_classes_are_added_changed_and_kept_while_used(boxed_session, open_panel) -> None:
@@ -57,6 +57,35 @@ def test_classes_are_added_changed_and_kept_while_used(boxed_session, open_panel
         assert [c["name"] for c in panel.answer("/classes")].count(first["name"]) == 1
         panel.saved(6)
         panel.expect_refusals(409, 412, 422)
+
+
+def test_what_is_typed_while_an_answer_is_awaited_stays(boxed_session, open_panel) -> None:
+    with open_panel(*boxed_session) as panel:
+        page = panel.page
+        first = panel.answer("/classes")[0]
+        held: list[Route] = []
+        page.route(f"**/classes/{first['id']}", lambda route: held.append(route))
+        page.get_by_role("region", name="Classes").locator(".class-row").first.click()
+        editor = page.get_by_role("dialog", name="Class ")
+        name = editor.get_by_role("textbox", name="Name", exact=True)
+        with page.expect_request(f"**/classes/{first['id']}"):
+            name.fill("cup")
+            name.press("Enter")
+        name.fill("cup and saucer")
+        held.pop().continue_()
+        panel.saved(1)
+        expect(name).to_have_value("cup and saucer")
+        sides = [editor.get_by_label(f"Usual size {axis}, mm") for axis in "XYZ"]
+        for side, text in zip(sides, ("80", "70", "60"), strict=True):
+            side.fill(text)
+        page.unroute(f"**/classes/{first['id']}")
+        page.route(f"**/classes/{first['id']}", lambda route: held.append(route))
+        with page.expect_request(f"**/classes/{first['id']}"):
+            sides[2].press("Enter")
+        sides[2].fill("65")
+        held.pop().continue_()
+        expect(page.locator(".class-row").first).to_contain_text("80 \u00d7 70 \u00d7 60")
+        expect(sides[2]).to_have_value("65")
 
 
 CUBE = (
