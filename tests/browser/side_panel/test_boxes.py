@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from playwright.sync_api import expect
+from playwright.sync_api import Route, expect
 
 from ars_web.recordings.registry import read_recording
 from ars_web.sessions.store import SessionStore
@@ -63,6 +63,28 @@ def test_boxes_are_listed_selected_by_keys_and_renamed_in_place(boxed_session, o
         panel.saved(2)
         assert panel.answer(f"/boxes/{boxes[-2]['id']}")["name"] == "by mouse"
         assert panel.answer("/boxes")[0] == boxes[0]
+
+
+def test_a_name_that_is_typed_on_while_the_first_is_stored_stays(boxed_session, open_panel) -> None:
+    with open_panel(*boxed_session) as panel:
+        page = panel.page
+        held: list[Route] = []
+        page.route("**/boxes/1", lambda route: held.append(route))
+        page.get_by_role("grid", name="Boxes").locator("[data-box='1']").click()
+        page.keyboard.press("F2")
+        field = page.get_by_role("textbox", name="Name of")
+        with page.expect_request("**/boxes/1"):
+            field.fill("lid")
+            field.press("Enter")
+        field.fill("lid of the pot")
+        held.pop().continue_()
+        page.unroute("**/boxes/1")
+        panel.saved(1)
+        expect(field).to_have_value("lid of the pot")
+        field.press("Enter")
+        panel.saved(2)
+        expect(field).to_have_count(0)
+        assert panel.answer("/boxes/1")["name"] == "lid of the pot"
 
 
 def test_hiding_is_this_pages_own_and_locking_is_everybodys(boxed_session, open_panel) -> None:
