@@ -294,7 +294,26 @@ def test_few_pairs_are_told(make_session: Callable[..., SessionSnapshot]) -> Non
     assert any(line.startswith("Only 3 labels have a partner") for line in found.warnings)
 
 
-@pytest.mark.parametrize(("kind", "least"), [("yolo", 0.999), ("coco", 0.999), ("voc", 0.97), ("cvat", 0.99)])
+def test_an_empty_frame_of_a_video_counts(make_session: Callable[..., SessionSnapshot], tmp_path: Path) -> None:
+    """Three frames, a cup drawn in the middle one: in the other two the session's labels have no partner."""
+    sides = 'xtl="90" ytl="90" xbr="110" ybr="110" outside="0"'
+    (tmp_path / "annotations.xml").write_text(
+        "<annotations><meta><task><size>3</size></task></meta>"
+        f'<track id="0" label="cup"><box frame="1" {sides}/></track></annotations>'
+    )
+    found = study(make_session(), read_labels(tmp_path / "annotations.xml"))
+    assert [(one.name, one.manual, one.automatic, one.matched) for one in found.frames] == [
+        ("a.png", 0, 2, 0),
+        ("b.png", 1, 2, 1),
+        ("c.png", 0, 2, 0),
+    ]
+    total = found.rectangles["in_image"].total
+    assert (total.precision, total.recall, total.mean_iou) == (1 / 6, 1.0, pytest.approx(1.0))
+
+
+@pytest.mark.parametrize(
+    ("kind", "least"), [("yolo", 0.999), ("coco", 0.999), ("voc", 0.97), ("cvat", 0.99), ("cvat-video", 0.99)]
+)
 def test_our_own_exports_agree_with_the_session(
     make_session: Callable[..., SessionSnapshot], tmp_path: Path, kind: str, least: float
 ) -> None:
