@@ -91,16 +91,19 @@ def _joined(path: Path, files: list[Path], options: TruthOptions, split: str | N
     if len(set(names.values())) != len(ids):
         raise BadFile(files[0], "two of its categories have one name; name them apart")
     class_of = {id_: place for place, id_ in enumerate(ids)}
-    places: dict[int, int] = {}
+    found: dict[int, TruthImage] = {}
     for file, content in zip(files, contents, strict=True):
         root, part = _root(path), file.stem.removeprefix("instances_")
         # COCO's own images of instances_val2017.json are in val2017/.
         roots = [root, root / "images", root / part, root / "images" / part]
         for image in content.images:
-            if image.id in places:
+            if image.id in found:
                 raise BadFile(file, f"image id {image.id} is there twice; ids tell images apart")
-            places[image.id] = len(labels.images)
-            labels.images.append(_image(image, roots, options))
+            found[image.id] = _image(image, roots, options)
+    # By their ids, as pycocotools goes through them: of predictions of one score the earlier image's come first.
+    labels.images.extend(found[id_] for id_ in sorted(found))
+    places = {id_: place for place, id_ in enumerate(sorted(found))}
+    for file, content in zip(files, contents, strict=True):
         _take_annotations(file, content, labels, places, class_of)
     sized = all(image.size is not None for image in labels.images)
     return labels.truth(
