@@ -1,6 +1,7 @@
 """YOLO predictions: a folder of text files, one an image, with rows `class cx cy w h confidence`, shares of the image.
 
-A file is of the image of its name; an image without a file has no predictions. Classes have numbers.
+A file is of the image of its name; an image without a file has no predictions. Classes have numbers. Folders called
+labels, in which detectors put the files beside pictures, are in no image's name.
 """
 
 from pathlib import Path
@@ -11,6 +12,9 @@ from ars_web.evaluation.yolo_rows import rectangle, rows_of
 
 LISTS = ("classes.txt", "labels.txt", "names.txt", "notes.txt")
 """Files that programs lay beside label files."""
+
+
+FOLDER = "labels"
 
 
 def is_one(path: Path) -> bool:
@@ -27,12 +31,15 @@ def read(path: Path, into: PredictionsRead) -> None:
     files = _files(path) if path.is_dir() else [path]
     if not files:
         raise BadFile(path, "holds no text file; YOLO predictions are one file an image, `class cx cy w h confidence`")
+    file_of: dict[int, Path] = {}
     for file in files:
-        name = file.relative_to(path).with_suffix("").as_posix() if path.is_dir() else file.stem
+        parts = file.relative_to(path).with_suffix("").parts if path.is_dir() else (file.stem,)
         try:
-            image = into.image_named(name)
+            image = into.image_named("/".join((*(part for part in parts[:-1] if part != FOLDER), parts[-1])))
         except BadInput as error:
             raise BadFile(file, str(error)) from error
+        if (other := file_of.setdefault(image, file)) is not file:
+            raise BadFile(file, f"is of the same image as {other}; give the folder of one detector's one run")
         size = into.truth.images[image].size if into.truth.in_pixels else (1, 1)
         for line, number, numbers in rows_of(file):
             if len(numbers) != 5:
@@ -52,4 +59,6 @@ def read(path: Path, into: PredictionsRead) -> None:
 
 
 def _files(path: Path) -> list[Path]:
-    return [file for file in sorted(path.rglob("*.txt")) if file.name not in LISTS]
+    return [
+        file for file in sorted(path.rglob("*.txt")) if file.name not in LISTS and not file.name.startswith("README")
+    ]
