@@ -308,6 +308,30 @@ def test_a_truth_that_is_not_there_is_named(tmp_path: Path) -> None:
             read_truth(tmp_path, format=kind)
 
 
+@pytest.mark.parametrize("kind", ["kitti", "tfrecord", "webdataset", "parquet", "bop", "dope", "masks", "compass"])
+def test_our_datasets_that_are_no_truth_say_what_to_give_instead(kind: str) -> None:
+    said = rf"is a dataset of the format {kind}; evaluate takes coco, yolo, voc, cvat and ars .* --format coco"
+    with pytest.raises(BadInput, match=said):
+        read_truth(GOLDEN / kind)
+
+
+@pytest.mark.parametrize(
+    ("file", "title"),
+    [
+        ("training/label_2/000000.txt", "KITTI"),
+        ("records/train.tfrecord-00000-of-00001", "TFRecord"),
+        ("shard-000000.tar", "WebDataset"),
+        ("labels.parquet", "Parquet"),
+        ("test/000001/scene_gt.json", "BOP"),
+    ],
+)
+def test_other_datasets_that_are_no_truth_say_what_to_give_instead(tmp_path: Path, file: str, title: str) -> None:
+    (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)
+    (tmp_path / file).touch()
+    with pytest.raises(BadInput, match=rf"looks like {title}; evaluate takes .* Convert it to a COCO file"):
+        read_truth(tmp_path)
+
+
 def test_an_empty_split_is_named(tmp_path: Path) -> None:
     folder = _yolo(tmp_path, "val: images/val\ntrain: images/train\nnames: [a]\n", labels__train__x="0 0.5 0.5 1 1\n")
     (tmp_path / "images" / "val").mkdir(parents=True)
