@@ -200,6 +200,16 @@ def test_difficult_objects_and_crowds_are_ignored(tmp_path: Path) -> None:
     assert truth.crowd.tolist() == [True, False, False]
 
 
+def test_voc_files_in_a_folder_of_their_own_are_read(tmp_path: Path) -> None:
+    """As label programs write them, beside the images or not."""
+    for file in (GOLDEN / "voc" / "Annotations").iterdir():
+        shutil.copy(file, tmp_path / file.name)
+    assert cv2.imwrite(str(tmp_path / "0009.jpg"), np.zeros((64, 48, 3), np.uint8))
+    truth = read_truth(tmp_path)
+    assert (truth.format, len(truth.images), len(truth.bbox)) == ("voc", 4, 12)
+    assert [one.file for one in truth.images if one.file] == [tmp_path / "0009.jpg"]
+
+
 def test_labels_that_are_odd_are_told(tmp_path: Path) -> None:
     rows = "0 0.5 0.5 0.2 0.2\n0 0.5 0.5 0.2 0.2\n0 0.5 0.5 0.2 0\n"
     folder = _yolo(tmp_path, "val: images\nnames: [a]\n", labels__x=rows)
@@ -277,8 +287,10 @@ def _rows(rows: str, yaml: str = "val: images\nnames: [a, b]\n") -> Callable[[Pa
         ),
         (_coco(lambda c: c["annotations"].clear()), "holds no label in its 1 images"),
         (_coco(lambda c: (c["annotations"].clear(), c["images"].clear())), "holds no image"),
-        (_voc("<xmax>", "<xmax>wide"), r"0009\.xml:\d+: <xmax>: 'wide\d+' is not a finite number"),
+        (_voc("<xmax>", "<xmax>wide"), r"0009\.xml:\d+: <xmax> holds 'wide\d+', which is no number"),
         (_voc("<xmin>", "<xmin>99"), r"0009\.xml:\d+: <bndbox>: .* ends before it begins"),
+        (_voc("<annotation>", "<nothing>"), r"0009\.xml:\d+: begins with <nothing>, not with <annotation>"),
+        (_voc("<width>48", "<width>48.5"), r"0009\.xml:\d+: <size> must hold width and height in whole pixels"),
         (_voc("<bndbox>", "<b/><x>"), r"0009\.xml:\d+: is not XML"),
         (_voc("<name>cube</name>", ""), r"0009\.xml:\d+: <object> has no name"),
         (_voc("<name>cube", "<name>cone"), r"dataset\.json: names no class 'cone'"),
