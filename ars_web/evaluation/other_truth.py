@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from ars_web.annotations import cvat
+from ars_web.annotations.yolo_rows import YoloRow, box_of, rows_of
 from ars_web.errors import BadFile
 from ars_web.evaluation.detections import Truth, TruthImage
 from ars_web.evaluation.labels_read import LabelsRead
@@ -17,7 +18,6 @@ from ars_web.evaluation.truth_layout import (
     size_of,
     text_lines,
 )
-from ars_web.evaluation.yolo_rows import rectangle, rows_of
 from ars_web.recordings.options import NOTHING_SAID
 
 
@@ -81,7 +81,7 @@ def _read_ars(path: Path, options: TruthOptions) -> Truth:
         if not stems:
             raise BadFile(lists[split], "is empty: the split has no image; choose another by --split")
     labels = LabelsRead()
-    rows: list[tuple[int, int, int, list[float]]] = []
+    rows: list[tuple[int, YoloRow]] = []
     for place, stem in enumerate(stems):
         if stem not in everything:
             raise BadFile(path, f"labels/{stem}.txt is missing, which {split}.txt lists")
@@ -89,17 +89,18 @@ def _read_ars(path: Path, options: TruthOptions) -> Truth:
         labels.images.append(
             TruthImage(f"images/{stem}" if file is None else f"images/{file.name}", size_of(file, options), file)
         )
-        rows.extend((place, line, number, numbers) for line, number, numbers in rows_of(everything[stem]))
+        rows.extend((place, row) for row in rows_of(everything[stem]))
     own = own_classes(path)
-    count = max((number for _, _, number, _ in rows), default=-1) + 1
+    count = max((row.number for _, row in rows), default=-1) + 1
     classes = list(own or map(str, range(count)))
     sized = all(image.size is not None for image in labels.images)
     sizes = [(image.size if sized else None) or (1, 1) for image in labels.images]
-    for place, line, number, numbers in rows:
+    for place, row in rows:
         file = everything[stems[place]]
-        if number >= len(classes) or len(numbers) != 4:
-            raise BadFile(file, f"a row is class cx cy w h, with one of {len(classes)} classes from 0", line=line)
-        labels.add(place, number, rectangle(file, line, numbers, sizes[place]))
+        if row.number >= len(classes) or len(row.values) != 4:
+            raise BadFile(file, f"a row is class cx cy w h, with one of {len(classes)} classes from 0", line=row.line)
+        x0, y0, x1, y1 = (box_of(file, row) * np.tile(sizes[place], 2)).tolist()
+        labels.add(place, row.number, (x0, y0, x1, y1))
     return labels.truth(path, "ars", classes=classes, split=split, numbers=tuple(range(len(classes))), in_pixels=sized)
 
 

@@ -6,15 +6,20 @@ labels, in which detectors put the files beside pictures, are in no image's name
 
 from pathlib import Path
 
+import numpy as np
+
+from ars_web.annotations.yolo_rows import box_of, rows_of
 from ars_web.errors import BadFile, BadInput
 from ars_web.evaluation.predictions_read import PredictionsRead
-from ars_web.evaluation.yolo_rows import rectangle, rows_of
 
 LISTS = ("classes.txt", "labels.txt", "names.txt", "notes.txt")
 """Files that programs lay beside label files."""
 
 
 FOLDER = "labels"
+
+BESIDE = 9.0
+"""How far beyond the image a prediction may lie, in its widths and heights: further than a label, as networks err."""
 
 
 def is_one(path: Path) -> bool:
@@ -41,21 +46,20 @@ def read(path: Path, into: PredictionsRead) -> None:
         if (other := file_of.setdefault(image, file)) is not file:
             raise BadFile(file, f"is of the same image as {other}; give the folder of one detector's one run")
         size = into.truth.images[image].size if into.truth.in_pixels else (1, 1)
-        for line, number, numbers in rows_of(file):
-            if len(numbers) != 5:
-                said = f"has {len(numbers)} numbers after the class; a row is class cx cy w h confidence"
-                remedy = "; have the detector save confidences, too (save_conf)" if len(numbers) == 4 else ""
-                raise BadFile(file, said + remedy, line=line)
+        for row in rows_of(file):
+            if len(row.values) != 5:
+                said = f"has {len(row.values)} numbers after the class; a row is class cx cy w h confidence"
+                remedy = "; have the detector save confidences, too (save_conf)" if len(row.values) == 4 else ""
+                raise BadFile(file, said + remedy, line=row.line)
             if size is None:
                 raise BadFile(
                     file, "the truth has no size for this image, so shares of it are nowhere; say --image-size"
                 )
+            x0, y0, x1, y1 = (box_of(file, row, beside=BESIDE) * np.tile(size, 2)).tolist()
             try:
-                into.add(image, into.class_numbered(number), rectangle(file, line, numbers[:4], size), numbers[4])
-            except BadFile:
-                raise
+                into.add(image, into.class_numbered(row.number), (x0, y0, x1, y1), row.values[4])
             except BadInput as error:
-                raise BadFile(file, str(error), line=line) from error
+                raise BadFile(file, str(error), line=row.line) from error
 
 
 def _files(path: Path) -> list[Path]:

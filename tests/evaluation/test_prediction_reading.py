@@ -272,8 +272,10 @@ def read_yolo(truth: Truth, folder: Path, rows: str, name: str = "0009", **optio
         ("0 0.5 0.5 0.2 0.2 0.9\n5 0.5 0.5 0.2 0.2 0.9\n", r"0009\.txt:2: class 5 is none of 0: cube, 1: a "),
         ("0 0.5 0.5 0.2 -0.2 0.9\n", r"0009\.txt:1: width 0\.2 and height -0\.2 must not be negative"),
         ("0 0.5 0.5 0.2 0.2 90\n", r"0009\.txt:1: the score 90 is not between 0 and 1"),
-        ("0 0.5 0.5 0.2 0.2 nan\n", r"0009\.txt:1: 'nan' is not a finite number"),
-        ("0 32 24 12 10 0.9\n", r"0009\.txt:1: 32 24 12 10 are no shares"),
+        ("0 0.5 0.5 0.2 0.2 nan\n", r"0009\.txt:1: 'nan' is no number"),
+        ("cube 0.5 0.5 0.2 0.2 0.9\n", r"0009\.txt:1: 'cube' is no class number; they are whole, from 0"),
+        ("0 0.5 0.5 0.2 0.2 0.9\xff\n", r"0009\.txt:1: '0\.9.' is no number"),
+        ("0 32 24 12 10 0.9\n", r"0009\.txt:1: 32 is no share of .*; divide pixels by them"),
     ],
 )
 def test_a_bad_row_of_yolo_is_named(truth: Truth, tmp_path: Path, rows: str, said: str) -> None:

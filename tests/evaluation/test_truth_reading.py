@@ -247,17 +247,20 @@ def _rows(rows: str, yaml: str = "val: images\nnames: [a, b]\n") -> Callable[[Pa
 @pytest.mark.parametrize(
     ("write", "said"),
     [
-        (_rows("0 0.5 0.5 0.2\n"), r"x\.txt:1: has 3 numbers after the class; a row is class cx cy w h"),
-        (_rows("0 0.5 0.5 0.2 0.2\n0 0.5 0.5 0.2 0.2 0.9\n"), r"x\.txt:2: has 5 numbers"),
+        (_rows("0 0.5 0.5 0.2\n"), r"x\.txt:1: 3 numbers follow the class: a rectangle has four \(cx cy w h\)"),
+        (
+            _rows("0 0.5 0.5 0.2 0.2\n0 0.5 0.5 0.2 0.2 0.9\n"),
+            r"x\.txt:2: 5 numbers follow .* confidence: leave it out",
+        ),
         (
             _rows("0 0.5 0.5 0.2 0.2\n\n2 0.5 0.5 0.2 0.2\n"),
             r"x\.txt:3: class 2 is none of data\.yaml's \(0: a, 1: b\)",
         ),
         (_rows("0.5 0.5 0.5 0.2 0.2\n"), r"x\.txt:1: '0\.5' is no class number"),
-        (_rows("0 0.5 nan 0.2 0.2\n"), r"x\.txt:1: 'nan' is not a finite number"),
-        (_rows("0 0.5 wide 0.2 0.2\n"), r"x\.txt:1: 'wide' is not a finite number"),
+        (_rows("0 0.5 nan 0.2 0.2\n"), r"x\.txt:1: 'nan' is no number"),
+        (_rows("0 0.5 wide 0.2 0.2\n"), r"x\.txt:1: 'wide' is no number"),
         (_rows("0 0.5 0.5 -0.2 0.2\n"), r"x\.txt:1: width -0\.2 and height 0\.2 must not be negative"),
-        (_rows("0 320 240 100 50\n"), r"x\.txt:1: 320 240 100 50 are no shares of the image"),
+        (_rows("0 320 240 100 50\n"), r"x\.txt:1: 320 is no share of the image's width"),
         (_rows("\n"), "holds no label in its 1 images"),
         (_rows("", "val: images\nnames: [a, a]\n"), "two of its names are the same"),
         (_rows("", "val: images\n"), "has no names"),
@@ -267,6 +270,8 @@ def _rows(rows: str, yaml: str = "val: images\nnames: [a, b]\n") -> Callable[[Pa
         (_rows("", "val: {a: b}\nnames: [a]\n"), "val must be a path"),
         (_rows("", "val: images\nnames: [a\n"), r"data\.yaml:2: is no YAML"),
         (_rows("", "- a\n"), "is no mapping"),
+        (_rows("", "names:\n" + "- " * 2_000), r"data\.yaml: is nested too deeply"),
+        (_rows("0 0.5 0.5 1 1 0 0 2\n", "val: images\nnames: [a]\nkpt_shape: [2, 2]\n"), "four .* and 4 of keypoints"),
         (_rows("0 0.5 0.5 1 1\n", "val: images\nnames: [a]\nkpt_shape: 9\n"), "kpt_shape must be"),
         (
             _coco(lambda c: c["annotations"][1].update(bbox=[1, 2, -3, 4])),
