@@ -1,13 +1,17 @@
 """CVAT's XML, and the original program's raw dataset, as truth."""
 
+import re
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from ars_web.annotations import cvat
+from ars_web.annotations.foreign import ForeignImage
 from ars_web.annotations.yolo_rows import YoloRow, box_of, rows_of
 from ars_web.errors import BadFile
 from ars_web.evaluation.detections import Truth, TruthImage
+from ars_web.evaluation.image_names import ENDINGS, stem_of
 from ars_web.evaluation.labels_read import LabelsRead
 from ars_web.evaluation.truth_layout import (
     SPLITS,
@@ -19,6 +23,8 @@ from ars_web.evaluation.truth_layout import (
     text_lines,
 )
 from ars_web.recordings.options import NOTHING_SAID
+
+_NUMBER = re.compile(r"\d{1,18}$")
 
 
 def _is_cvat(path: Path) -> bool:
@@ -39,30 +45,51 @@ def _read_cvat(path: Path, options: TruthOptions) -> Truth:
     bounds.sort(key=lambda one: one[0])
     own = own_classes(files[0].parent)
     classes = list(own or sorted({name for _, name, _ in bounds}))
-    labels = LabelsRead(
-        images=[
-            TruthImage(one.called, one.size or options.image_size, _image(files[0], one.name)) for one in read.images
-        ]
-    )
+    pictures = _numbered_pictures(files[0]) if any(one.name is None for one in read.images) else {}
+    labels = LabelsRead(images=[_cvat_image(files[0], one, pictures, options) for one in read.images])
     for image, name, bbox in bounds:
         if name not in classes:
             raise BadFile(files[0].parent / "dataset.json", f"names no class {name!r}, which {files[0].name} has")
         x0, y0, x1, y1 = bbox.tolist()
         labels.add(image, classes.index(name), (x0, y0, x1, y1))
-    left_out = len(read.left_out)
+    warnings: list[str] = []
+    if read.left_out:
+        warnings.append(f"{files[0]}: {len(read.left_out)} shapes are no labels here: {read.left_out[0].reason}")
+    if own is not None:
+        warnings.append(
+            f"{files[0]}: splits are not read from CVAT's files, so images of training count, too; to score one"
+            " split, export the same as coco and give that"
+        )
     return labels.truth(
         path,
         "cvat",
         classes=classes,
         split=None,
         numbers=None if own is None else tuple(range(len(classes))),
-        warnings=(f"{files[0]}: {left_out} shapes are no labels here: {read.left_out[0].reason}",) if left_out else (),
+        warnings=warnings,
     )
 
 
-def _image(file: Path, name: str | None) -> Path | None:
-    found = [] if name is None else [file.parent / name, file.parent / "images" / name]
-    return next((place for place in found if place.is_file()), None)
+def _cvat_image(file: Path, image: ForeignImage, pictures: Mapping[int, Path], options: TruthOptions) -> TruthImage:
+    """A video's frames have numbers alone: they are called as CVAT calls their pictures, or as those are called."""
+    size = image.size or options.image_size
+    if image.name is not None:
+        places = (file.parent / image.name, file.parent / "images" / image.name)
+        return TruthImage(image.name, size, next((place for place in places if place.is_file()), None))
+    number = image.number or 0
+    picture = pictures.get(number)
+    name = f"frame_{number:06d}" if picture is None else picture.relative_to(file.parent).as_posix()
+    return TruthImage(name, size, picture, number)
+
+
+def _numbered_pictures(file: Path) -> dict[int, Path]:
+    """The pictures in images/ beside a file by the numbers that their names end with."""
+    found: dict[int, Path] = {}
+    for picture in sorted((file.parent / "images").rglob("*")):
+        match = _NUMBER.search(stem_of(picture.name))
+        if picture.suffix.lower() in ENDINGS and match is not None:
+            found.setdefault(int(match[0]), picture)
+    return found
 
 
 def _is_ars(path: Path) -> bool:

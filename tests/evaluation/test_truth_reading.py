@@ -12,6 +12,7 @@ import pytest
 
 from ars_web.errors import BadFile, BadInput
 from ars_web.evaluation.detections import Truth
+from ars_web.evaluation.prediction_reading import read_predictions
 from ars_web.evaluation.scoring import evaluate
 from ars_web.evaluation.truth_reading import read_truth
 
@@ -208,6 +209,33 @@ def test_voc_files_in_a_folder_of_their_own_are_read(tmp_path: Path) -> None:
     truth = read_truth(tmp_path)
     assert (truth.format, len(truth.images), len(truth.bbox)) == ("voc", 4, 12)
     assert [one.file for one in truth.images if one.file] == [tmp_path / "0009.jpg"]
+
+
+def test_frames_of_a_cvat_video_are_found_by_name_and_number(tmp_path: Path) -> None:
+    """Frame 1 of 3 is labelled; pictures are called as CVAT calls them, or there are none."""
+    sides = 'xtl="1" ytl="2" xbr="3" ybr="4" outside="0"'
+    (tmp_path / "annotations.xml").write_text(
+        "<annotations><meta><task><size>3</size></task></meta>"
+        f'<track id="0" label="cup"><box frame="1" {sides}/></track></annotations>'
+    )
+    truth = read_truth(tmp_path)
+    assert sorted((image.name, image.coco_id) for image in truth.images) == [(f"frame_00000{i}", i) for i in range(3)]
+    assert truth.warnings == ()
+    (tmp_path / "found.json").write_text('[{"image_id": 2, "category_id": "cup", "bbox": [1, 2, 2, 2], "score": 1}]')
+    (tmp_path / "found.csv").write_text("image,class,x0,y0,x1,y1,score\nframe_000002.png,cup,1,2,3,4,1\n")
+    for name in ("found.json", "found.csv"):
+        found = read_predictions(tmp_path / name, truth)
+        assert [truth.images[place].name for place in found.image] == ["frame_000002"]
+        detector = evaluate(truth, [found], coco=False).detectors[0]
+        # In an empty frame, which is one of the truth's.
+        assert (detector.counts.tp, detector.averages.at_50) == (0, 0)
+    (tmp_path / "images").mkdir()
+    for number in range(3):
+        assert cv2.imwrite(str(tmp_path / "images" / f"{number:05d}.png"), np.zeros((6, 8, 3), np.uint8))
+    truth = read_truth(tmp_path)
+    assert sorted(image.name for image in truth.images) == [f"images/0000{i}.png" for i in range(3)]
+    assert all(image.file == tmp_path / image.name for image in truth.images)
+    assert any("splits are not read" in line for line in read_truth(GOLDEN / "cvat-video").warnings)
 
 
 def test_labels_that_are_odd_are_told(tmp_path: Path) -> None:
