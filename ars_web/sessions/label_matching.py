@@ -46,12 +46,15 @@ class Matching:
         return LeftOut(self.problems[image], where)
 
 
-def matched_images(labels: ForeignLabels, frames: FrameTable, cameras: Mapping[int, Camera]) -> Matching:
+def matched_images(
+    labels: ForeignLabels, frames: FrameTable, cameras: Mapping[int, Camera], *, session: str = ""
+) -> Matching:
     """Find the frames by the images' names, or by their numbers.
 
     A name is that of a frame, or else ends as one does, folders included, where only one frame ends so; endings of
     files may differ (`labels/left/1.txt` is `images/left/1.png`, and so is `1.jpg` where there is no second 1). Or
-    else it is what exports make of a frame's name (`a/1.png` becomes `a_1`). Of several images that fit one frame
+    else it is what exports make of a frame's name (`a/1.png` becomes `a_1`, and `SESSION_a_1` where they hold several
+    sessions; `session` is this one's id). Of several images that fit one frame
     the one whose name shares the most folders with the frame's is it.
     A number is the digits in a frame's name, where every number has one frame; else it counts the frames from 0, where
     the file has as many images as the session has frames. Numbers of a video count the frames in the first place.
@@ -61,7 +64,8 @@ def matched_images(labels: ForeignLabels, frames: FrameTable, cameras: Mapping[i
     """
     named = [place for place, image in enumerate(labels.images) if image.name is not None]
     numbered = [place for place, image in enumerate(labels.images) if image.name is None]
-    fits, notes = _by_name([(place, labels.images[place].name or "") for place in named], frames.names), list[str]()
+    names, notes = [(place, labels.images[place].name or "") for place in named], list[str]()
+    fits = _by_name(names, frames.names, f"{session}_" if session else "")
     if numbered:
         by_number, how = _by_number(labels.images, numbered, frames.names)
         fits |= {place: _Fit(frame, 0) for place, frame in by_number.items()}
@@ -131,7 +135,7 @@ class _Fit:
 _WHOLE, _SEVERAL = 1 << 30, -1
 
 
-def _by_name(named: Sequence[tuple[int, str]], names: Sequence[str]) -> dict[int, _Fit]:
+def _by_name(named: Sequence[tuple[int, str]], names: Sequence[str], prefix: str) -> dict[int, _Fit]:
     whole = {name: index for index, name in enumerate(names)}
     ends = _unique_ends(names)
     plain = _unique([_plain(PurePosixPath(name)) for name in names])
@@ -142,7 +146,7 @@ def _by_name(named: Sequence[tuple[int, str]], names: Sequence[str]) -> dict[int
             found[place] = _Fit(whole[name], _WHOLE)
             continue
         end = next((end for end in _ends(path) if end in ends), None)
-        exported = plain.get(_plain(PurePosixPath(path.name)))
+        exported = plain.get(_plain(PurePosixPath(path.name)).removeprefix(prefix))
         if end is not None:
             found[place] = _Fit(ends[end], len(end))
         elif exported is not None:

@@ -328,6 +328,21 @@ def test_our_own_exports_agree_with_the_session(
     assert found.left_out == ()
 
 
+@pytest.mark.parametrize("kind", ["yolo", "coco", "voc", "cvat"])
+def test_an_export_of_two_sessions_is_compared_with_each(
+    make_session: Callable[..., SessionSnapshot], tmp_path: Path, kind: str
+) -> None:
+    """Their frames have the same names; names of files begin with the sessions' ids."""
+    first = make_session()
+    second = replace(first, id="s2")
+    options = ExportOptions.model_validate({"images": "none"})
+    run_export(plan_export([first, second], format=kind, options=options, out=tmp_path / "out"))
+    for session in (first, second):
+        found = study(session, read_labels(tmp_path / "out"))
+        assert [(one.name, one.manual, one.matched) for one in found.frames] == [(name, 3, 3) for name in NAMES]
+        assert any("3 of its 6 images are not compared" in note for note in found.notes)
+
+
 def test_a_report_escapes_names_and_needs_nothing_beside_it(make_session: Callable[..., SessionSnapshot]) -> None:
     script = "<script>alert(1)</script>"
     objects = ((script, OBJECTS[0][1]), *OBJECTS[1:])
