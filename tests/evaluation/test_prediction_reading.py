@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ars_web import evaluation
 from ars_web.errors import BadFile, BadInput
+from ars_web.evaluation import prediction_reading, scoring, truth_reading
 from ars_web.evaluation.detections import Predictions, Truth
 from ars_web.evaluation.prediction_reading import read_predictions
 from ars_web.evaluation.scoring import evaluate
@@ -356,6 +359,18 @@ def test_predictions_of_a_class_that_is_labelled_nowhere_are_told(truth: Truth, 
     )
     found = read_yolo(few, tmp_path, "1 0.5 0.5 0.2 0.2 0.9\n")
     assert "1 predictions are of 'a \"tall\" & <odd> one: #1', which is labelled nowhere" in found.warnings[0]
+
+
+def test_the_packages_example_runs_as_it_is_written(truth: Truth, tmp_path: Path, monkeypatch) -> None:
+    shutil.copytree(GOLDEN / "coco", tmp_path / "dataset")
+    write_coco(read_truth(GOLDEN / "coco"), tmp_path / "results.json")
+    monkeypatch.chdir(tmp_path)
+    example = [line.strip() for line in (evaluation.__doc__ or "").splitlines() if line.startswith("    ")]
+    names: dict[str, object] = {"Path": Path}
+    names |= {module.__name__.rsplit(".", 1)[-1]: module for module in (prediction_reading, scoring, truth_reading)}
+    for line in example[:-1]:
+        exec(line, names)
+    assert eval(example[-1], names) == 1
 
 
 def test_what_is_not_there_or_not_known_is_named(truth: Truth, tmp_path: Path) -> None:
