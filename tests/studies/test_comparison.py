@@ -20,7 +20,7 @@ from ars_web.geometry.polygon import Polygon
 from ars_web.sessions.model import FrameTable, ObjectClass, SessionSnapshot, SessionState, VirtualBox
 from ars_web.studies.agreement import Agreement, Confusion
 from ars_web.studies.comparison import Comparison, compare
-from ars_web.studies.comparison_report import comparison_page
+from ars_web.studies.comparison_report import comparison_page, offset_rows
 
 CAMERA = Camera(200, 200, 100.0, 100.0, 99.5, 99.5)
 """A point at X, Y, Z lies at 100 + 100 X / Z, 100 + 100 Y / Z in image coordinates."""
@@ -287,6 +287,11 @@ def test_labels_that_are_all_narrower_are_told(make_session: Callable[..., Sessi
     """Nothing hides the cups, and 14 x 14 of 20 x 20 px, 54 x 14 of 60 x 20 are left of them: 0.49 and 0.63."""
     found = study(make_session(names=MANY), cups(left=3, top=3, right=-3, bottom=-3))
     assert any("that nothing hides overlap by 0.56 only" in line for line in found.warnings)
+
+
+def test_sides_that_are_where_they_should_be_have_one_sign(make_session: Callable[..., SessionSnapshot]) -> None:
+    found = study(make_session(names=MANY), cups(left=1e-4, right=-1e-4, top=1e-4, bottom=-1e-4))
+    assert offset_rows(found)[0][1:] == ("+0.00",) * 4
 
 
 def test_few_pairs_are_told(make_session: Callable[..., SessionSnapshot]) -> None:
