@@ -12,8 +12,9 @@ from typing import cast
 
 import numpy as np
 import shapely
-from pydantic import BaseModel, ConfigDict
+from pydantic import Field
 
+from ars_web.annotations.coco_file import CocoAnnotation, CocoFile, CocoImage, CocoPart, find, named, read_coco
 from ars_web.annotations.foreign import (
     INSTANCE_NAMES,
     ForeignImage,
@@ -26,15 +27,14 @@ from ars_web.annotations.run_masks import mask_from_columns, outline_of
 from ars_web.errors import BadFile, BadInput
 from ars_web.geometry.mask_regions import polygons_of, region
 from ars_web.geometry.polygon import Polygon
-from ars_web.recordings.json_file import holds_words, parse_json
-from ars_web.recordings.number_rows import file_bytes
 from ars_web.recordings.options import ReadOptions
 
 TITLE = "COCO instances"
 NEEDS = "a JSON file with images, annotations and categories"
 
+__all__ = ["NEEDS", "TITLE", "are_parts", "find", "read"]
+
 _PARTS = "instances_"
-_OF_BOP = "scene_gt"
 
 _CROWD = (
     "it is marked as a crowd (iscrowd), which is several objects in one outline; where it is one, set iscrowd to 0 or"
@@ -47,30 +47,9 @@ _LARGEST = 1e9
 """Of any number of pixels."""
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="ignore", frozen=True)
-
-
-class _Image(_Part):
-    id: int
-    file_name: str
-    width: int | None = None
-    height: int | None = None
-
-
-class _Category(_Part):
-    id: int
-    name: str
-
-
-class _Annotation(_Part):
-    id: int | None = None
-    image_id: int
-    category_id: int
+class _Annotation(CocoAnnotation):
     segmentation: object = None
-    bbox: list[float] | None = None
-    iscrowd: int = 0
-    attributes: dict[str, object] = {}
+    attributes: dict[str, object] = Field(default_factory=dict[str, object])
     track_id: int | str | None = None
     instance_id: int | str | None = None
     object_id: int | str | None = None
@@ -85,35 +64,16 @@ class _Annotation(_Part):
         return None
 
 
-class _File(_Part):
-    images: list[_Image]
-    annotations: list[_Annotation]
-    categories: list[_Category]
-
-
-class _Dataset(_Part):
+class _Dataset(CocoPart):
     """Of this program's dataset.json what says whose dataset it is."""
 
     program: str
     format: str
 
 
-def find(path: Path) -> list[Path]:
-    """The JSON files of instances at `path`, in the folder or in its annotations/."""
-    if path.is_dir():
-        files = [*sorted(path.glob("*.json")), *sorted(path.glob("annotations/*.json"))]
-        # A BOP scene has its boxes as COCO, too, which say less than its poses.
-        return [file for file in files if not file.name.startswith(_OF_BOP) and _is_one(file)]
-    return [path] if _is_one(path) else []
-
-
 def are_parts(files: Sequence[Path]) -> bool:
     """Whether files are the splits of one set: instances_train.json, instances_val.json."""
     return all(file.name.startswith(_PARTS) for file in files)
-
-
-def _is_one(file: Path) -> bool:
-    return holds_words(file, (b'"images"', b'"annotations"', b'"categories"'))
 
 
 def read(file: Path, options: ReadOptions) -> ForeignLabels:
@@ -122,21 +82,15 @@ def read(file: Path, options: ReadOptions) -> ForeignLabels:
     Raises:
         BadFile: it is damaged; the message names the annotation by its id.
     """
-    content = parse_json(file, file_bytes(file), _File)
+    content = read_coco(file, CocoFile[_Annotation])
     names = {category.id: category.name for category in content.categories}
     places = {image.id: place for place, image in enumerate(content.images)}
-    if len(places) != len(content.images):
-        raise BadFile(file, "two of its images have one id")
     own = _own_instances(file, content, options)
     outlines: list[ForeignOutline] = []
     rectangles: list[ForeignRectangle] = []
     left_out: list[LeftOut] = []
     for row, one in enumerate(content.annotations):
-        where = f"annotation {row if one.id is None else one.id}"
-        if one.image_id not in places:
-            raise BadFile(file, f"{where}: there is no image {one.image_id} among its images")
-        if one.category_id not in names:
-            raise BadFile(file, f"{where}: there is no category {one.category_id} among its categories")
+        where = named(row, one)
         place, name = places[one.image_id], names[one.category_id]
         instance = one.instance or own.get(row)
         try:
@@ -153,19 +107,13 @@ def read(file: Path, options: ReadOptions) -> ForeignLabels:
             left_out.append(LeftOut(_NOTHING if polygons is None else _EMPTY, where))
         else:
             outlines.append(ForeignOutline(place, name, instance, polygons, where))
-    images = tuple(
-        ForeignImage(
-            name=image.file_name,
-            size=None if image.width is None or image.height is None else (image.width, image.height),
-        )
-        for image in content.images
-    )
+    images = tuple(ForeignImage(name=image.file_name, size=image.size) for image in content.images)
     return ForeignLabels(
         "coco", file, images, outlines=tuple(outlines), rectangles=tuple(rectangles), left_out=tuple(left_out)
     )
 
 
-def _polygons(segmentation: object, image: _Image) -> tuple[Polygon, ...] | None:
+def _polygons(segmentation: object, image: CocoImage) -> tuple[Polygon, ...] | None:
     """The outline; None where there is none, and no polygon where its mask is empty."""
     if segmentation is None or segmentation == []:
         return None
@@ -225,7 +173,7 @@ def _bbox(given: Sequence[float]) -> np.ndarray:
     return np.array([x, y, x + width, y + height], dtype=np.float64)
 
 
-def _own_instances(file: Path, content: _File, options: ReadOptions) -> dict[int, str]:
+def _own_instances(file: Path, content: CocoFile[_Annotation], options: ReadOptions) -> dict[int, str]:
     """Which box each annotation is of, by its row, in a dataset that this program wrote; none in any other.
 
     Its ids are (image id - 1) * m + box + 1, where m, which is in no file, is the most boxes that a session has: the

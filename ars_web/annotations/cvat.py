@@ -4,8 +4,9 @@ for images  <image name width height> with shapes; which of them are one object 
             attribute called track_id, instance_id or object_id, where people gave labels one
 for video   <track label> with a shape for each frame, which are one object; outside="1": it is not there. A track
             ends where it says so, or with its last shape. Between the shapes that are listed boxes move evenly, as
-            in CVAT; polygons and masks are taken from the frames that are listed. Frames have numbers from 0, no
-            names
+            in CVAT; polygons and masks are taken from the frames that are listed. Frames have numbers, no names.
+            Those in which no track is are images, too, that show nothing: the head of the file says how many there
+            are (`cvat_frames`)
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ars_web.annotations import cvat_shapes
+from ars_web.annotations import cvat_frames, cvat_shapes
 from ars_web.annotations.cvat_shapes import OTHER_SHAPES, SHAPES, attribute, whole_number
 from ars_web.annotations.foreign import (
     INSTANCE_NAMES,
@@ -66,6 +67,9 @@ class _Found:
     rectangles: list[ForeignRectangle] = field(default_factory=list[ForeignRectangle])
     left_out: list[LeftOut] = field(default_factory=list[LeftOut])
     frames: dict[int, int] = field(default_factory=dict[int, int])
+    tasks: list[XmlElement] = field(default_factory=list[XmlElement])
+    task_frames: range | None = None
+    listed: set[int] = field(default_factory=set[int])
     size: tuple[int, int] | None = None
     between: int = 0
 
@@ -103,10 +107,14 @@ def read(file: Path, options: ReadOptions) -> ForeignLabels:
     for element in elements_of(file, root="annotations"):
         if element.tag == "meta":
             found.size = _original_size(file, element)
+            found.tasks = cvat_frames.tasks_of(element)
+            if len(found.tasks) == 1:
+                found.task_frames = cvat_frames.frame_numbers(file, found.tasks[0])
         elif element.tag == "image":
             _take_image(file, element, found)
         elif element.tag == "track":
             _take_track(file, element, found)
+    _take_empty_frames(found)
     if not found.images and not found.left_out:
         raise BadFile(file, "holds no <image> and no <track>")
     return ForeignLabels(
@@ -158,6 +166,9 @@ def _instance(shape: XmlElement) -> str | None:
 
 def _take_track(file: Path, track: XmlElement, found: _Found) -> None:
     label, instance = attribute(file, track, "label"), f"track {attribute(file, track, 'id')}"
+    if len(found.tasks) > 1:
+        said = f"{instance}: the file holds {len(found.tasks)} tasks, and the frames of each are numbered from its own"
+        raise BadFile(file, f"{said} first; export each task by itself", line=track.line)
     shapes: dict[int, XmlElement] = {}
     for shape in track.children:
         if shape.tag not in (*SHAPES, *OTHER_SHAPES):
@@ -167,6 +178,7 @@ def _take_track(file: Path, track: XmlElement, found: _Found) -> None:
             raise BadFile(file, f"{instance} has two shapes in frame {frame}", line=shape.line)
         shapes[frame] = shape
     listed = sorted(shapes.items())
+    found.listed.update(shapes)
     for (frame, shape), after in zip(listed, [*listed[1:], None], strict=True):
         if shape.attributes.get("outside") == "1":
             continue
@@ -174,12 +186,13 @@ def _take_track(file: Path, track: XmlElement, found: _Found) -> None:
         if shape.tag in OTHER_SHAPES:
             found.left_out.append(LeftOut(_other(shape.tag), where))
         elif shape.tag == "box":
+            step = found.task_frames.step if found.task_frames is not None else 1
             if after is not None:
                 found.between += after[0] - frame - 1
             if found.between > MOST_BETWEEN:
                 said = f"its tracks leave over {MOST_BETWEEN} boxes between those that it lists; divide it"
                 raise BadFile(file, said, line=shape.line)
-            for between, box in _boxes_until(file, frame, shape, after):
+            for between, box in _boxes_until(file, frame, shape, after, step):
                 where = f"{instance}, frame {between}, line {shape.line}"
                 found.take_box(found.place_of(between), label, instance, box, where)
         else:
@@ -187,9 +200,9 @@ def _take_track(file: Path, track: XmlElement, found: _Found) -> None:
 
 
 def _boxes_until(
-    file: Path, frame: int, shape: XmlElement, after: tuple[int, XmlElement] | None
+    file: Path, frame: int, shape: XmlElement, after: tuple[int, XmlElement] | None, step: int
 ) -> Iterator[tuple[int, np.ndarray]]:
-    """A track's box in its frame, and in those up to the next that is listed."""
+    """A track's box in its frame, and in every `step`th up to the next that is listed."""
     box = cvat_shapes.box_of(file, shape)
     yield frame, box
     if after is None or after[1].tag != "box":
@@ -197,8 +210,17 @@ def _boxes_until(
     until, next_shape = after
     # A track that leaves stays where it was until then: CVAT writes its last place into the frame outside, too.
     next_box = cvat_shapes.box_of(file, next_shape)
-    for between in range(frame + 1, until):
+    # What is listed off the step tells that the head means something else.
+    for between in range(frame, until, step if (until - frame) % step == 0 else 1)[1:]:
         yield between, cvat_shapes.box_between(box, next_box, (between - frame) / (until - frame))
+
+
+def _take_empty_frames(found: _Found) -> None:
+    """The frames of a video in which no track is: somebody looked at them, and they show nothing."""
+    numbers = found.task_frames
+    if found.listed and numbers is not None and cvat_frames.are_all_of(numbers, found.listed):
+        for frame in numbers:
+            found.place_of(frame)
 
 
 def _other(tag: str) -> str:

@@ -1,16 +1,18 @@
 """Pascal VOC's XML files, one an image: rectangles in whole pixels, counted from 1, the last pixel included.
 
 Programs that count from 0 write the same files; their rectangles come out one pixel too far left and up at the first
-sides, which nothing in a file tells. `pose`, `truncated`, `difficult` and `occluded` play no part; parts of objects
-(`part`) are no objects.
+sides, which nothing in a file tells. `pose`, `truncated` and `occluded` play no part, and `difficult` only where
+detectors are judged; parts of objects (`part`) are no objects.
 
 Source: http://host.robots.ox.ac.uk/pascal/VOC/voc2012/htmldoc/index.html, "Annotation guidelines" and 4.4
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float
 
 from ars_web.annotations.foreign import ForeignImage, ForeignLabels, ForeignRectangle
 from ars_web.annotations.xml_elements import XmlElement, elements_of
@@ -27,10 +29,19 @@ _LARGEST = 1e9
 
 
 def find(path: Path) -> list[Path]:
-    """The XML files of images at `path`, in the folder or its Annotations/."""
-    if path.is_dir():
-        return [file for place in (path, path / _FOLDER) for file in sorted(place.glob("*.xml")) if _is_one(file)]
-    return [path] if path.suffix == ".xml" and _is_one(path) else []
+    """The XML files of images at `path`, in the folder or its Annotations/.
+
+    Where one in a folder called Annotations is of an image all there are: one that is not is damaged, and reading it
+    says so.
+    """
+    if not path.is_dir():
+        return [path] if path.suffix == ".xml" and _is_one(path) else []
+    found: list[Path] = []
+    for place in (path, path / _FOLDER):
+        files = sorted(place.glob("*.xml"))
+        everything = place.name == _FOLDER and any(map(_is_one, files))
+        found.extend(files if everything else filter(_is_one, files))
+    return found
 
 
 def are_parts(files: Sequence[Path]) -> bool:
@@ -46,23 +57,70 @@ def _is_one(file: Path) -> bool:
     return b"<annotation>" in head or b"<annotation " in head
 
 
-def read(file: Path, options: ReadOptions) -> ForeignLabels:
+@dataclass(frozen=True, eq=False)
+class VocObject:
+    """One object.
+
+    Attributes:
+        bbox: (4,) x0, y0, x1, y1, image coordinates.
+        is_difficult: marked as one that nobody need find.
+        line: on which it begins.
+    """
+
+    class_name: str
+    bbox: Float[np.ndarray, "4"]
+    is_difficult: bool
+    line: int
+
+
+@dataclass(frozen=True, eq=False)
+class VocImage:
+    """One image's file.
+
+    Attributes:
+        name: of the image's file; None: it is not told.
+        size: width and height in pixels; None: it is not told.
+    """
+
+    name: str | None
+    size: tuple[int, int] | None
+    objects: tuple[VocObject, ...]
+
+
+def read_image(file: Path) -> VocImage:
     """Read one image's file.
 
     Raises:
         BadFile: it is damaged; the message names the line.
     """
-    name, size = file.name, None
-    rectangles: list[ForeignRectangle] = []
+    name, size = None, None
+    objects: list[VocObject] = []
     for element in elements_of(file, root="annotation"):
         if element.tag == "filename" and element.text.strip():
             name = element.text.strip()
         elif element.tag == "size":
             size = _size(file, element)
         elif element.tag == "object":
-            where = f"object {len(rectangles)}, line {element.line}"
-            rectangles.append(ForeignRectangle(0, _text(file, element, "name"), None, _bbox(file, element), where))
-    return ForeignLabels("voc", file, (ForeignImage(name=name, size=size),), rectangles=tuple(rectangles))
+            difficult = element.child("difficult")
+            is_difficult = difficult is not None and difficult.text.strip() not in ("", "0")
+            bbox = _bbox(file, element)
+            objects.append(VocObject(_text(file, element, "name"), bbox, is_difficult, element.line))
+    return VocImage(name, size, tuple(objects))
+
+
+def read(file: Path, options: ReadOptions) -> ForeignLabels:
+    """Read one image's file.
+
+    Raises:
+        BadFile: it is damaged; the message names the line.
+    """
+    image = read_image(file)
+    rectangles = [
+        ForeignRectangle(0, one.class_name, None, one.bbox, f"object {place}, line {one.line}")
+        for place, one in enumerate(image.objects)
+    ]
+    shown = ForeignImage(name=image.name or file.name, size=image.size)
+    return ForeignLabels("voc", file, (shown,), rectangles=tuple(rectangles))
 
 
 def _size(file: Path, element: XmlElement) -> tuple[int, int] | None:

@@ -3,7 +3,7 @@
     truth = truth_reading.read_truth(Path("dataset"), split="val")
     found = prediction_reading.read_predictions(Path("results.json"), truth)
     evaluation = scoring.evaluate(truth, [found], iou=0.5)
-    evaluation.detectors[0].mean_ap_50
+    evaluation.detectors[0].averages.at_50
 
 A training loop needs no files: `Truth` and `Predictions` (`detections.py`) are columns that it fills itself, and
 `Evaluation` (`scores.py`) is what comes back. Rectangles are x0, y0, x1, y1 in image coordinates.

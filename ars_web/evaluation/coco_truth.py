@@ -1,70 +1,34 @@
-"""COCO's instances_*.json as truth: rectangles as they stand, crowds ignored, areas by which sizes are told."""
+"""COCO's instances_*.json as truth: rectangles as they stand, crowds ignored, areas by which sizes are told.
+
+Files are found and read by `annotations/coco_file.py`. Of an annotation a truth wants its rectangle alone, of no size
+perhaps, which then counts as missed; labels of a session come of outlines, and need a rectangle that holds something.
+"""
 
 import re
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict
-
+from ars_web.annotations import coco_file
+from ars_web.annotations.coco_file import CocoAnnotation, CocoFile, CocoImage, named, read_coco
 from ars_web.errors import BadFile
 from ars_web.evaluation.detections import Truth, TruthImage
 from ars_web.evaluation.labels_read import LabelsRead
 from ars_web.evaluation.truth_layout import SPLITS, TruthLayout, TruthOptions, chosen_split
-from ars_web.recordings.json_file import holds_words, parse_json
-from ars_web.recordings.number_rows import file_bytes
 
 # COCO's own files carry the year: instances_val2017.json.
 _SPLIT = re.compile(r"instances_(train|val|test)\d*\.json")
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="ignore", frozen=True)
-
-
-class _Image(_Part):
-    id: int
-    file_name: str
-    width: int | None = None
-    height: int | None = None
-
-
-class _Category(_Part):
-    id: int
-    name: str
-
-
-class _Annotation(_Part):
-    id: int | None = None
-    image_id: int
-    category_id: int
-    bbox: list[float] | None = None
+class _Annotation(CocoAnnotation):
     area: float | None = None
-    iscrowd: int = 0
     ignore: int = 0
 
 
-class _File(_Part):
-    images: list[_Image]
-    annotations: list[_Annotation]
-    categories: list[_Category]
-
-
-def _files(path: Path) -> list[Path]:
-    if path.is_file():
-        return [path] if path.suffix.lower() == ".json" and _holds_instances(path) else []
-    found = [*sorted(path.glob("annotations/*.json")), *sorted(path.glob("*.json"))]
-    return [file for file in found if not file.name.startswith("scene_gt") and _holds_instances(file)]
-
-
-def _holds_instances(file: Path) -> bool:
-    return holds_words(file, (b'"images"', b'"annotations"', b'"categories"'))
-
-
 def _is_one(path: Path) -> bool:
-    return bool(_files(path))
+    return bool(coco_file.find(path))
 
 
 def _read(path: Path, options: TruthOptions) -> Truth:
-    found = _files(path) or [path]
+    found = coco_file.find(path) or [path]
     by_split = {match[1]: file for file in found if (match := _SPLIT.fullmatch(file.name))}
     if path.is_file() or not by_split:
         if len(found) > 1:
@@ -80,7 +44,7 @@ def _read(path: Path, options: TruthOptions) -> Truth:
 def _joined(path: Path, files: list[Path], options: TruthOptions, split: str | None) -> Truth:
     labels = LabelsRead()
     names: dict[int, str] = {}
-    contents = [parse_json(file, file_bytes(file), _File) for file in files]
+    contents = [read_coco(file, CocoFile[_Annotation]) for file in files]
     for file, content in zip(files, contents, strict=True):
         for category in content.categories:
             if names.setdefault(category.id, category.name) != category.name:
@@ -91,16 +55,19 @@ def _joined(path: Path, files: list[Path], options: TruthOptions, split: str | N
     if len(set(names.values())) != len(ids):
         raise BadFile(files[0], "two of its categories have one name; name them apart")
     class_of = {id_: place for place, id_ in enumerate(ids)}
-    places: dict[int, int] = {}
+    found: dict[int, TruthImage] = {}
     for file, content in zip(files, contents, strict=True):
         root, part = _root(path), file.stem.removeprefix("instances_")
         # COCO's own images of instances_val2017.json are in val2017/.
         roots = [root, root / "images", root / part, root / "images" / part]
         for image in content.images:
-            if image.id in places:
-                raise BadFile(file, f"image id {image.id} is there twice; ids tell images apart")
-            places[image.id] = len(labels.images)
-            labels.images.append(_image(image, roots, options))
+            if image.id in found:
+                raise BadFile(file, f"image id {image.id} is that of another image in the files before; give one file")
+            found[image.id] = _image(image, roots, options)
+    # By their ids, as pycocotools goes through them: of predictions of one score the earlier image's come first.
+    labels.images.extend(found[id_] for id_ in sorted(found))
+    places = {id_: place for place, id_ in enumerate(sorted(found))}
+    for file, content in zip(files, contents, strict=True):
         _take_annotations(file, content, labels, places, class_of)
     sized = all(image.size is not None for image in labels.images)
     return labels.truth(
@@ -116,14 +83,10 @@ def _joined(path: Path, files: list[Path], options: TruthOptions, split: str | N
 
 
 def _take_annotations(
-    file: Path, content: _File, labels: LabelsRead, places: dict[int, int], class_of: dict[int, int]
+    file: Path, content: CocoFile[_Annotation], labels: LabelsRead, places: dict[int, int], class_of: dict[int, int]
 ) -> None:
     for row, one in enumerate(content.annotations):
-        where = f"annotation {row if one.id is None else one.id}"
-        if one.image_id not in places:
-            raise BadFile(file, f"{where}: there is no image {one.image_id} among its images")
-        if one.category_id not in class_of:
-            raise BadFile(file, f"{where}: there is no category {one.category_id} among its categories")
+        where = named(row, one)
         if one.bbox is None or len(one.bbox) != 4:
             raise BadFile(file, f"{where}: bbox must be x, y, width and height, not {one.bbox}")
         x, y, width, height = one.bbox
@@ -148,8 +111,8 @@ def _root(path: Path) -> Path:
     return folder.parent if folder.name == "annotations" else folder
 
 
-def _image(image: _Image, roots: list[Path], options: TruthOptions) -> TruthImage:
-    size = options.image_size if image.width is None or image.height is None else (image.width, image.height)
+def _image(image: CocoImage, roots: list[Path], options: TruthOptions) -> TruthImage:
+    size = image.size or options.image_size
     file = next((found for root in roots if (found := root / image.file_name).is_file()), None)
     return TruthImage(image.file_name, size, file, image.id)
 

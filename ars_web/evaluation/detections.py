@@ -17,7 +17,7 @@ class TruthImage:
         name: its path or name as the truth has it.
         size: width and height in pixels; None: not known.
         file: where its pixels are; None: they are not there.
-        coco_id: its id in a COCO file; None in other formats.
+        coco_id: its id in a COCO file, its number in a CVAT video; None in other formats.
     """
 
     name: str

@@ -72,6 +72,8 @@ def read_predictions(
 
 
 def _found(path: Path) -> PredictionFormat:
+    if path.is_file() and path.stat().st_size == 0:
+        raise BadFile(path, "is empty; what a detector wrote that found nothing is [], or a header of CSV")
     for one in FORMATS.values():
         if one.is_one(path):
             return one

@@ -16,6 +16,11 @@ UNUSED = "-"
 _SHOWN = 8
 
 
+def _written_number(text: str) -> int | None:
+    """The whole number that a text is, as a program writes it; None where it is none."""
+    return int(text) if text.isascii() and text.isdecimal() and len(text) < 19 and str(int(text)) == text else None
+
+
 @dataclass(eq=False)
 class PredictionsRead:
     """What has been read so far.
@@ -56,28 +61,57 @@ class PredictionsRead:
         """The place of the image of that id in COCO results: an id of the truth where that is COCO, else a name, or
         the number that a name consists of; BadInput where there is none."""
         if isinstance(image_id, str):
-            return self.image_named(image_id)
+            # Some programs write all ids as texts; a name goes first.
+            id_ = _written_number(image_id)
+            return (
+                self._coco_ids[id_]
+                if id_ in self._coco_ids and not self._is_named(image_id)
+                else self.image_named(image_id)
+            )
         if self._coco_ids:
             if image_id not in self._coco_ids:
+                meant = self._numbered_images(image_id)
+                hint = ""
+                if len(meant) == 1:
+                    one = self.truth.images[meant[0]]
+                    hint = f"; ids are those of its images, not the numbers in their names: {one.name} is {one.coco_id}"
                 raise BadInput(
-                    f"image_id {image_id} is not among the truth's {len(self._coco_ids)}; choose them by --split"
+                    f"image_id {image_id} is not among the truth's {len(self._coco_ids)}; choose them by --split{hint}"
                 )
             return self._coco_ids[image_id]
         if image_id not in self._found:
-            stems = [stem_of(image.name.rsplit("/", 1)[-1]) for image in self.truth.images]
-            same = [place for place, stem in enumerate(stems) if stem.isdecimal() and int(stem) == image_id]
+            same = self._numbered_images(image_id)
             if len(same) != 1:
                 known = "no image's name is that number" if not same else "several images' names are that number"
                 raise BadInput(f"image_id {image_id}: {known}; write the images' names as image_id")
             self._found[image_id] = same[0]
         return self._found[image_id]
 
+    def _is_named(self, name: str) -> bool:
+        try:
+            self.image_named(name)
+        except BadInput:
+            return False
+        return True
+
+    def _numbered_images(self, number: int) -> list[int]:
+        """The places of the images whose names are that number."""
+        stems = [stem_of(image.name.rsplit("/", 1)[-1]) for image in self.truth.images]
+        return [place for place, stem in enumerate(stems) if stem.isdecimal() and int(stem) == number]
+
     def class_named(self, name: str) -> int:
         """The place of the class of that name; BadInput where there is none."""
         if name not in self._class_of:
             known = ", ".join(self.truth.classes[:_SHOWN]) + (", …" if len(self.truth.classes) > _SHOWN else "")
-            raise BadInput(f"class {name[:80]!r} is none of the truth's: {known}")
+            remedy = "; say by --classes what the numbers 0, 1, … mean" if name.isdecimal() else ""
+            raise BadInput(f"class {name[:80]!r} is none of the truth's: {known}{remedy}")
         return self._class_of[name]
+
+    def class_said(self, text: str) -> int:
+        """The place of the class of that name, or of that number where it was said what numbers mean; BadInput where
+        there is none."""
+        number = _written_number(text) if self.class_names and text not in self._class_of else None
+        return self.class_named(text) if number is None else self.class_numbered(number)
 
     def class_numbered(self, number: int) -> int:
         """The place of the class of that number; BadInput where there is none, or classes have no numbers."""
@@ -99,21 +133,27 @@ class PredictionsRead:
 
     def class_of_category(self, category: int | str) -> int:
         """The place of a category of COCO results: the truth's ids where that is COCO, else numbers or names."""
-        if isinstance(category, str):
-            return self.class_named(category)
         ids = self.truth.category_ids
+        if isinstance(category, str):
+            number = _written_number(category)
+            if number is None or category in self._class_of or (ids is None and not self.class_names):
+                return self.class_named(category)
+            category = number
         if ids is None or self.class_names:
             return self.class_numbered(category)
         if category not in ids:
             known = ", ".join(f"{i}: {name}" for i, name in list(zip(ids, self.truth.classes, strict=True))[:_SHOWN])
-            raise BadInput(f"category_id {category} is none of the truth's ({known})")
+            raise BadInput(
+                f"category_id {category} is none of the truth's ({known}); where a detector has its own numbers, say by"
+                " --classes what 0, 1, … mean"
+            )
         return ids.index(category)
 
     def add(self, image: int, class_: int, rectangle: tuple[float, float, float, float], score: float) -> None:
         """One prediction; BadInput where its rectangle or score cannot be."""
         x0, y0, x1, y1 = rectangle
         if not all(abs(value) <= 1e9 for value in rectangle):
-            raise BadInput(f"the rectangle {x0:g}, {y0:g}, {x1:g}, {y1:g} is not finite")
+            raise BadInput(f"the rectangle {x0:g}, {y0:g}, {x1:g}, {y1:g} is not finite, or far beyond any image")
         if x1 < x0 or y1 < y0:
             raise BadInput(f"the rectangle {x0:g}, {y0:g} to {x1:g}, {y1:g} has a negative size")
         if not 0 <= score <= 1:

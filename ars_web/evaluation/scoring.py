@@ -95,11 +95,12 @@ def _class_score(
         undefined = Averages(None, None, None, None, None, None, None)
         return ClassScore(name, 0, len(rows), undefined, BestScore(np.inf, 0.0), counts, None, None)
 
-    def curve(matches: Matches) -> Curve:
+    def curve(matches: Matches, rows: Int[np.ndarray, " k"] = rows) -> Curve:
         return precision_recall.curve(scores[rows], matches.right[rows], matches.wrong[rows], labels)
 
     low, at_iou, *of_coco = (precision_recall.coco_ap(curve(matches)) for matches in by_coco)
-    voc = curve(by_voc)
+    # VOC sorts a file's rows by score alone, so that of one score they stay as the file has them.
+    voc = curve(by_voc, np.sort(rows))
     averages = Averages(
         coco=float(np.mean(of_coco)),
         at_30=low,

@@ -63,11 +63,22 @@ class _Dataset(BaseModel):
 
 def own_classes(folder: Path) -> tuple[str, ...] | None:
     """The classes of a dataset that this program wrote, by their numbers; None where it is somebody else's."""
+    told = _own(folder)
+    return None if told is None else tuple(one.name for one in told.classes)
+
+
+def own_format(folder: Path) -> str | None:
+    """The format of a dataset that this program wrote; None where it is somebody else's."""
+    told = _own(folder)
+    return None if told is None else told.format
+
+
+def _own(folder: Path) -> _Dataset | None:
     try:
         told = _Dataset.model_validate_json((folder / "dataset.json").read_bytes())
     except (OSError, ValueError):
         return None
-    return tuple(one.name for one in told.classes) if told.program == "ars-web" else None
+    return told if told.program == "ars-web" else None
 
 
 def chosen_split(source: Path, present: Sequence[str], wanted: str | None) -> str | None:

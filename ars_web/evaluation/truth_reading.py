@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from ars_web.errors import BadFile, BadInput
-from ars_web.evaluation import coco_truth, other_truth, voc_truth, yolo_truth
+from ars_web.evaluation import coco_truth, other_truth, unread_truth, voc_truth, yolo_truth
 from ars_web.evaluation.detections import Truth, check_truth
 from ars_web.evaluation.truth_layout import SPLITS, WHOLE, TruthLayout, TruthOptions
 
@@ -31,7 +31,10 @@ def read_truth(
         BadFile: a file of it is damaged; the message names file and line.
     """
     if format != "auto" and format not in LAYOUTS:
-        raise BadInput(f"truth of the format {format!r} is not read; read are auto, {', '.join(LAYOUTS)}")
+        raise BadInput(
+            f"truth of the format {format!r} is not read; read are auto, {', '.join(LAYOUTS)}. Export the same as coco,"
+            " or convert it, and give that"
+        )
     if split not in (None, WHOLE, *SPLITS):
         raise BadInput(f"split {split!r} is none of {', '.join((*SPLITS, WHOLE))}")
     if not path.exists():
@@ -46,8 +49,12 @@ def read_truth(
 
 
 def _found(path: Path) -> TruthLayout:
+    if unread := unread_truth.own_unread(path):
+        raise BadInput(unread)
     for layout in LAYOUTS.values():
         if layout.is_one(path):
             return layout
+    if unread := unread_truth.foreign_unread(path):
+        raise BadInput(unread)
     known = "; ".join(f"{layout.format}: {layout.title}" for layout in LAYOUTS.values())
     raise BadInput(f"{path} holds no labels that are known. Known are {known}")

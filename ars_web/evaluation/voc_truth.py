@@ -1,14 +1,16 @@
 """Pascal VOC as truth: Annotations/*.xml, ImageSets/Main/*.txt, JPEGImages; objects marked `difficult` are ignored.
 
-Corners are counted from 1 and inclusive: xmin, ymin, xmax, ymax become xmin - 1, ymin - 1, xmax, ymax.
+What one file says is read by `annotations/voc.py`. A truth asks for more than labels of a session do: which split an
+image is of, its size where the file lacks it, and the classes that only other splits have.
 """
 
 from pathlib import Path
 
-from ars_web.annotations.xml_elements import XmlElement, elements_of
-from ars_web.errors import BadFile, BadInput
+from ars_web.annotations import voc
+from ars_web.annotations.voc import VocImage
+from ars_web.errors import BadFile
 from ars_web.evaluation.detections import Truth, TruthImage
-from ars_web.evaluation.labels_read import LabelsRead, number
+from ars_web.evaluation.labels_read import LabelsRead
 from ars_web.evaluation.truth_layout import (
     SPLITS,
     TruthLayout,
@@ -19,33 +21,32 @@ from ars_web.evaluation.truth_layout import (
     text_lines,
 )
 
-_CORNERS = ("xmin", "ymin", "xmax", "ymax")
-
 
 def _is_one(path: Path) -> bool:
-    return any((path / "Annotations").glob("*.xml"))
+    return path.is_dir() and bool(voc.find(path))
 
 
 def _read(path: Path, options: TruthOptions) -> Truth:
-    everything = {file.stem: file for file in sorted((path / "Annotations").glob("*.xml"))}
+    # Label programs write the files into a folder of their own, without Annotations/ round them.
+    everything = {file.stem: file for file in voc.find(path)} if path.is_dir() else {}
     if not everything:
         raise BadFile(path, "holds no Annotations/*.xml")
     lists = {split: file for split in SPLITS if (file := path / "ImageSets" / "Main" / f"{split}.txt").is_file()}
     split = chosen_split(path, list(lists), options.split)
     stems = list(everything) if split is None else _listed(lists[split], everything)
-    labels = LabelsRead()
-    named: list[tuple[int, str, tuple[float, float, float, float], bool]] = []
-    for place, stem in enumerate(stems):
-        labels.images.append(_take_image(path, everything[stem], place, named, options))
+    read = {stem: voc.read_image(file) for stem, file in everything.items()}
     own = own_classes(path)
     # Classes that only other splits have are the set's, too: a detector may know them.
-    others = {name for stem in everything.keys() - set(stems) for name in _names_in(everything[stem])}
-    classes = list(own or sorted({name for _, name, _, _ in named} | others))
+    classes = list(own or sorted({one.class_name for image in read.values() for one in image.objects}))
     class_of = {name: place for place, name in enumerate(classes)}
-    for place, name, rectangle, difficult in named:
-        if name not in class_of:
-            raise BadFile(path / "dataset.json", f"names no class {name!r}, which {stems[place]}.xml has")
-        labels.add(place, class_of[name], rectangle, ignored=difficult)
+    labels = LabelsRead()
+    for place, stem in enumerate(stems):
+        labels.images.append(_image(path, everything[stem], read[stem], options))
+        for one in read[stem].objects:
+            if one.class_name not in class_of:
+                raise BadFile(path / "dataset.json", f"names no class {one.class_name!r}, which {stem}.xml has")
+            x0, y0, x1, y1 = one.bbox.tolist()
+            labels.add(place, class_of[one.class_name], (x0, y0, x1, y1), ignored=one.is_difficult)
     sized = all(image.size is not None for image in labels.images)
     return labels.truth(
         path,
@@ -73,67 +74,11 @@ def _listed(listing: Path, everything: dict[str, Path]) -> list[str]:
     return stems
 
 
-def _take_image(
-    path: Path,
-    file: Path,
-    place: int,
-    named: list[tuple[int, str, tuple[float, float, float, float], bool]],
-    options: TruthOptions,
-) -> TruthImage:
-    size: tuple[int, int] | None = None
-    name = file.stem
-    for element in elements_of(file, root="annotation"):
-        if element.tag == "filename" and element.text.strip():
-            name = element.text.strip()
-        elif element.tag == "size":
-            size = int(_value(file, element, "width")), int(_value(file, element, "height"))
-        elif element.tag == "object":
-            bndbox = element.child("bndbox")
-            if bndbox is None:
-                raise BadFile(file, "<object> has no bndbox", line=element.line)
-            x0, y0, x1, y1 = (_value(file, bndbox, corner) for corner in _CORNERS)
-            if x1 < x0 or y1 < y0:
-                raise BadFile(
-                    file, f"<bndbox>: {x0:g}, {y0:g} to {x1:g}, {y1:g} ends before it begins", line=bndbox.line
-                )
-            difficult = element.child("difficult")
-            named.append(
-                (
-                    place,
-                    _name(file, element),
-                    (x0 - 1, y0 - 1, x1, y1),
-                    difficult is not None and difficult.text.strip() not in ("", "0"),
-                )
-            )
-    image = next(
-        (found for found in (path / "JPEGImages" / name, path / "JPEGImages" / f"{file.stem}.jpg") if found.is_file()),
-        None,
-    )
-    if size is None or min(size) < 1:
-        size = size_of(image, options)
-    return TruthImage(name, size, image)
-
-
-def _names_in(file: Path) -> list[str]:
-    return [_name(file, element) for element in elements_of(file, root="annotation") if element.tag == "object"]
-
-
-def _name(file: Path, element: XmlElement) -> str:
-    child = element.child("name")
-    name = "" if child is None else child.text.strip()
-    if not name:
-        raise BadFile(file, "<object> has no name", line=element.line)
-    return name
-
-
-def _value(file: Path, element: XmlElement, tag: str) -> float:
-    child = element.child(tag)
-    if child is None:
-        raise BadFile(file, f"<{element.tag}> has no {tag}", line=element.line)
-    try:
-        return number(child.text.strip())
-    except BadInput as error:
-        raise BadFile(file, f"<{tag}>: {error}", line=child.line) from error
+def _image(path: Path, file: Path, told: VocImage, options: TruthOptions) -> TruthImage:
+    name = told.name or file.stem
+    places = (path / "JPEGImages" / name, path / "JPEGImages" / f"{file.stem}.jpg", file.parent / name)
+    found = next((place for place in places if place.is_file()), None)
+    return TruthImage(name, told.size or size_of(found, options), found)
 
 
 LAYOUT = TruthLayout("voc", "a folder with Annotations/*.xml, as Pascal VOC has it", _is_one, _read)

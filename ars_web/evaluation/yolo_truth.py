@@ -1,9 +1,13 @@
 """A YOLO dataset as truth: data.yaml, images, and label files of boxes; of outlines and keypoints their rectangles.
 
-Rows are `class cx cy w h` in shares of the image; of an outline (`class x y x y …`) the rectangle round its points is
-taken, as trainers do, and of a row with keypoints the box that it begins with. Where the set has no images (exports
+Rows are `class cx cy w h` in shares of the image; of an outline (`class x y x y x y …`) the rectangle round its points
+is taken, as trainers do, and of a row with keypoints the box that it begins with. Where the set has no images (exports
 with `images: none`), rectangles stay shares unless the images' size is said: overlaps are the same, but nothing is
 small or large.
+
+Rows and names are read by `annotations/yolo_rows.py` and `yolo_names.py`. Which files there are is told otherwise than
+for a session's labels: by the splits of data.yaml, images without a label file among them. A rectangle of no size
+counts as missed; labels of a session need one that holds something.
 """
 
 from collections.abc import Sequence
@@ -11,14 +15,16 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import cast
 
-import yaml
+import numpy as np
+from jaxtyping import Float
 
+from ars_web.annotations.yolo_names import YoloNames, read_names
+from ars_web.annotations.yolo_rows import YoloRow, box_of, ring_of, rows_of
 from ars_web.errors import BadFile
 from ars_web.evaluation.detections import Truth, TruthImage
 from ars_web.evaluation.image_names import ENDINGS, stem_of
 from ars_web.evaluation.labels_read import LabelsRead
 from ars_web.evaluation.truth_layout import SPLITS, TruthLayout, TruthOptions, chosen_split, size_of, text_lines
-from ars_web.evaluation.yolo_rows import Rectangle, rectangle, rows_of
 
 _UNSIZED = (1, 1)
 
@@ -28,17 +34,15 @@ class _Yaml:
     """A data.yaml.
 
     Attributes:
-        names: by class number.
+        classes: their names, and how many numbers of keypoints rows have.
         splits: paths as they stand, by split.
         base: what they are relative to.
-        keypoints: numbers a row has after its box; 0: rows have no keypoints.
     """
 
     file: Path
-    names: dict[int, str]
+    classes: YoloNames
     splits: dict[str, list[str]]
     base: Path
-    keypoints: int
 
 
 @dataclass(frozen=True)
@@ -85,7 +89,7 @@ def _read(path: Path, options: TruthOptions) -> Truth:
 
 
 def _truth(path: Path, told: _Yaml, split: str | None, images: Sequence[_Labelled], options: TruthOptions) -> Truth:
-    classes = sorted(told.names)
+    classes = sorted(told.classes.names)
     class_of = {number: place for place, number in enumerate(classes)}
     labels = LabelsRead()
     sized = True
@@ -95,11 +99,11 @@ def _truth(path: Path, told: _Yaml, split: str | None, images: Sequence[_Labelle
         labels.images.append(TruthImage(image.name, size, image.file))
         if not image.labels.is_file():
             continue  # An image without a label file shows nothing, as trainers have it.
-        for line, number, numbers in rows_of(image.labels):
-            if number not in class_of:
-                known = ", ".join(f"{n}: {told.names[n]}" for n in classes[:8])
-                raise BadFile(image.labels, f"class {number} is none of {told.file.name}'s ({known})", line=line)
-            labels.add(place, class_of[number], _bounds(image.labels, line, numbers, told.keypoints, size or _UNSIZED))
+        scale = np.tile(size or _UNSIZED, 2)
+        for row in rows_of(image.labels):
+            told.classes.name_of(image.labels, row)
+            x0, y0, x1, y1 = (_bounds(image.labels, row, told.classes.keypoints) * scale).tolist()
+            labels.add(place, class_of[row.number], (x0, y0, x1, y1))
     warnings = (
         ()
         if sized
@@ -111,7 +115,7 @@ def _truth(path: Path, told: _Yaml, split: str | None, images: Sequence[_Labelle
     return labels.truth(
         path,
         "yolo",
-        classes=[told.names[number] for number in classes],
+        classes=[told.classes.names[number] for number in classes],
         split=split,
         numbers=tuple(classes),
         category_ids=None,
@@ -120,57 +124,24 @@ def _truth(path: Path, told: _Yaml, split: str | None, images: Sequence[_Labelle
     )
 
 
-def _bounds(path: Path, line: int, numbers: list[float], keypoints: int, size: tuple[int, int]) -> Rectangle:
-    if len(numbers) == 4 or (keypoints and len(numbers) == 4 + keypoints):
-        return rectangle(path, line, numbers[:4], size)
-    if len(numbers) < 6 or len(numbers) % 2 or keypoints:
-        row = "class cx cy w h" + (
-            f" and {keypoints} numbers of keypoints" if keypoints else ", or class x y x y x y …"
-        )
-        raise BadFile(path, f"has {len(numbers)} numbers after the class; a row is {row}", line=line)
-    x, y = numbers[0::2], numbers[1::2]
-    x0, y0, x1, y1 = min(x), min(y), max(x), max(y)
-    return rectangle(path, line, [(x0 + x1) / 2, (y0 + y1) / 2, x1 - x0, y1 - y0], size)
+def _bounds(path: Path, row: YoloRow, keypoints: int) -> Float[np.ndarray, "4"]:
+    ring = ring_of(path, row, keypoints=keypoints)
+    return box_of(path, row) if ring is None else np.concatenate([ring.min(axis=0), ring.max(axis=0)])
 
 
 def _read_yaml(file: Path) -> _Yaml:
-    try:
-        # BaseLoader makes texts, lists and mappings, nothing else: a class may be called `no` or `1`.
-        content = cast("object", yaml.load("\n".join(text_lines(file)), Loader=yaml.BaseLoader))
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        line = None if mark is None else int(mark.line) + 1
-        raise BadFile(file, f"is no YAML: {getattr(error, 'problem', None) or error}", line=line) from error
-    if not isinstance(content, dict):
-        raise BadFile(file, "is no mapping; it needs names, train and val")
-    values = cast("dict[str, object]", content)
-    names = _names(file, values.get("names"))
-    splits = {split: _texts(file, split, values[split]) for split in SPLITS if values.get(split)}
+    told = read_names(file)
+    if len(set(told.names.values())) != len(told.names):
+        raise BadFile(file, "two of its names are the same; name classes apart")
+    splits = {split: _texts(file, split, told.values[split]) for split in SPLITS if told.values.get(split)}
     if not splits:
         raise BadFile(file, "names no split; it needs train or val, the folder of images")
     base = file.parent
-    root = values.get("path")
+    root = told.values.get("path")
     # Sets are moved: a path that is not there any more is where the file is now.
     if isinstance(root, str) and (base / root).is_dir():
         base = base / root
-    return _Yaml(file, names, splits, base, _keypoints(file, values.get("kpt_shape")))
-
-
-def _names(file: Path, given: object) -> dict[int, str]:
-    if isinstance(given, list):
-        pairs = [(str(place), name) for place, name in enumerate(cast("list[object]", given))]
-    elif isinstance(given, dict):
-        pairs = list(cast("dict[str, object]", given).items())
-    else:
-        raise BadFile(file, "has no names; give the classes as a list, or by their numbers")
-    names: dict[int, str] = {}
-    for key, name in pairs:
-        if not key.isdecimal() or not isinstance(name, str) or not name:
-            raise BadFile(file, f"names: {key!r}: {str(name)[:40]!r} is no class; they are NUMBER: NAME")
-        names[int(key)] = name
-    if not names or len(set(names.values())) != len(names):
-        raise BadFile(file, "names no class" if not names else "two of its names are the same; name classes apart")
-    return names
+    return _Yaml(file, told, splits, base)
 
 
 def _texts(file: Path, split: str, given: object) -> list[str]:
@@ -179,15 +150,6 @@ def _texts(file: Path, split: str, given: object) -> list[str]:
     if len(found) != len(texts):
         raise BadFile(file, f"{split} must be a path, or a list of paths")
     return found
-
-
-def _keypoints(file: Path, given: object) -> int:
-    if given is None:
-        return 0
-    texts = cast("list[object]", given) if isinstance(given, list) else []
-    if len(texts) != 2 or not all(isinstance(text, str) and text.isdecimal() for text in texts):
-        raise BadFile(file, f"kpt_shape must be [points, 2 or 3], not {given}")
-    return int(str(texts[0])) * int(str(texts[1]))
 
 
 def _images_of(told: _Yaml, split: str, entry: str) -> list[_Labelled]:

@@ -153,7 +153,7 @@ class LabelImport:
         """
         taken = photographs(self._store, sid)
         labels = read_labels(path, format=format, options=options)
-        plan = planned_labels(labels, taken.frames, taken.cameras)
+        plan = planned_labels(labels, taken.frames, taken.cameras, session=sid)
         made = [_made(taken, one) for one in plan.objects]
         coming = [one for one in made if one.labels is not None]
         drafts = [one.labels for one in coming if one.labels is not None]

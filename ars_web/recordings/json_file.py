@@ -26,11 +26,16 @@ def parse_json(path: Path, data: bytes, model: type[Model]) -> Model:
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
         message = first["msg"]
-        found = _PLACE.search(message)
         if first["type"] == "json_invalid":
-            raise BadFile(path, message, line=int(found[1]) if found else None) from error
+            raise BadFile(path, message, line=line_said(message)) from error
         place = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in first["loc"]).lstrip(".")
         raise BadFile(path, f"{place}: {message}") from error
+
+
+def line_said(message: str) -> int | None:
+    """The line that pydantic's message about broken JSON names; None where it names none."""
+    found = _PLACE.search(message)
+    return int(found[1]) if found else None
 
 
 def holds_words(path: Path, words: tuple[bytes, ...]) -> bool:

@@ -69,13 +69,15 @@ class LabelPlan:
     notes: tuple[str, ...]
 
 
-def planned_labels(labels: ForeignLabels, frames: FrameTable, cameras: Mapping[int, Camera]) -> LabelPlan:
-    """The objects of a file, in a session's frames.
+def planned_labels(
+    labels: ForeignLabels, frames: FrameTable, cameras: Mapping[int, Camera], *, session: str = ""
+) -> LabelPlan:
+    """The objects of a file, in the frames of a session, whose id is in the names of exports of several.
 
     Raises:
         BadFile: its images are not the session's or have another size, or a class's name cannot be used.
     """
-    matching = matched_images(labels, frames, cameras)
+    matching = matched_images(labels, frames, cameras, session=session)
     labels = in_pixels(labels, matching, frames, cameras)
     posed, unplaced = _posed(labels, matching, frames)
     seen, unseen = _seen(labels, matching, frames, cameras)

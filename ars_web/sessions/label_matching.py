@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import PurePosixPath
 
@@ -46,11 +46,16 @@ class Matching:
         return LeftOut(self.problems[image], where)
 
 
-def matched_images(labels: ForeignLabels, frames: FrameTable, cameras: Mapping[int, Camera]) -> Matching:
+def matched_images(
+    labels: ForeignLabels, frames: FrameTable, cameras: Mapping[int, Camera], *, session: str = ""
+) -> Matching:
     """Find the frames by the images' names, or by their numbers.
 
-    A name is that of a frame, or else its file name is, or else that without its ending, or else what exports make of a
-    frame's name (`a/1.png` becomes `a_1`), where only one frame has it.
+    A name is that of a frame, or else ends as one does, folders included, where only one frame ends so; endings of
+    files may differ (`labels/left/1.txt` is `images/left/1.png`, and so is `1.jpg` where there is no second 1). Or
+    else it is what exports make of a frame's name (`a/1.png` becomes `a_1`, and `SESSION_a_1` where they hold several
+    sessions; `session` is this one's id). Of several images that fit one frame
+    the one whose name shares the most folders with the frame's is it.
     A number is the digits in a frame's name, where every number has one frame; else it counts the frames from 0, where
     the file has as many images as the session has frames. Numbers of a video count the frames in the first place.
 
@@ -59,22 +64,25 @@ def matched_images(labels: ForeignLabels, frames: FrameTable, cameras: Mapping[i
     """
     named = [place for place, image in enumerate(labels.images) if image.name is not None]
     numbered = [place for place, image in enumerate(labels.images) if image.name is None]
-    found, notes = _by_name([(place, labels.images[place].name or "") for place in named], frames.names), list[str]()
+    names, notes = [(place, labels.images[place].name or "") for place in named], list[str]()
+    fits = _by_name(names, frames.names, f"{session}_" if session else "")
     if numbered:
         by_number, how = _by_number(labels.images, numbered, frames.names)
-        found |= by_number
+        fits |= {place: _Fit(frame, 0) for place, frame in by_number.items()}
         notes.append(how)
-    if labels.images and not found:
+    if labels.images and not fits:
         first = labels.images[0].called
         raise BadFile(
             labels.source,
             f"none of its {len(labels.images)} images is a frame of the session: its first is {first}, the session's"
             f" first {frames.names[0]}; are these the labels of another recording?",
         )
-    taken = Counter(found.values())
-    exact = {place for place in named if place in found and frames.names[found[place]] == labels.images[place].name}
-    once = Counter(found[place] for place in exact)
-    certain = {p: frame for p, frame in found.items() if taken[frame] == 1 or (p in exact and once[frame] == 1)}
+    found = {place: fit.frame for place, fit in fits.items()}
+    best: dict[int, int] = {}
+    for fit in fits.values():
+        best[fit.frame] = max(best.get(fit.frame, 0), fit.shared)
+    alone = Counter(fit.frame for fit in fits.values() if fit.shared == best[fit.frame])
+    certain = {p: fit.frame for p, fit in fits.items() if fit.shared == best[fit.frame] and alone[fit.frame] == 1}
     problems = {
         place: TWO_IMAGES if place in found else NO_FRAME for place in range(len(labels.images)) if place not in certain
     }
@@ -112,20 +120,56 @@ def in_pixels(
     return replace(labels, outlines=tuple(outlines), rectangles=tuple(rectangles), in_shares=False)
 
 
-def _by_name(named: Sequence[tuple[int, str]], names: Sequence[str]) -> dict[int, int]:
+@dataclass(frozen=True)
+class _Fit:
+    """A frame whose name fits an image's.
+
+    Attributes:
+        shared: parts from the end that the two names have in common; more than any of those where the names are one.
+    """
+
+    frame: int
+    shared: int
+
+
+_WHOLE, _SEVERAL = 1 << 30, -1
+
+
+def _by_name(named: Sequence[tuple[int, str]], names: Sequence[str], prefix: str) -> dict[int, _Fit]:
     whole = {name: index for index, name in enumerate(names)}
-    files = _unique([PurePosixPath(name).name for name in names])
-    stems = _unique([PurePosixPath(name).stem for name in names])
+    ends = _unique_ends(names)
     plain = _unique([_plain(PurePosixPath(name)) for name in names])
-    found: dict[int, int] = {}
+    found: dict[int, _Fit] = {}
     for place, name in named:
         path = PurePosixPath(name.replace("\\", "/"))
-        exported = plain.get(_plain(PurePosixPath(path.name)))
-        for index in (whole.get(name), files.get(path.name), stems.get(path.stem), exported):
-            if index is not None:
-                found[place] = index
-                break
+        if name in whole:
+            found[place] = _Fit(whole[name], _WHOLE)
+            continue
+        end = next((end for end in _ends(path) if end in ends), None)
+        exported = plain.get(_plain(PurePosixPath(path.name)).removeprefix(prefix))
+        if end is not None:
+            found[place] = _Fit(ends[end], len(end))
+        elif exported is not None:
+            found[place] = _Fit(exported, 0)
     return found
+
+
+def _ends(path: PurePosixPath) -> Iterator[tuple[str, ...]]:
+    """How a name ends, the longest first: so many folders and the file, as it stands and without its ending."""
+    parts = path.parts or ("",)
+    for first in range(len(parts)):
+        yield parts[first:]
+        yield (*parts[first:-1], path.stem)
+
+
+def _unique_ends(names: Sequence[str]) -> dict[tuple[str, ...], int]:
+    """The name that ends so, for each end that only one has."""
+    found: dict[tuple[str, ...], int] = {}
+    for index, name in enumerate(names):
+        for end in _ends(PurePosixPath(name)):
+            if found.setdefault(end, index) != index:
+                found[end] = _SEVERAL
+    return {end: index for end, index in found.items() if index != _SEVERAL}
 
 
 def _plain(path: PurePosixPath) -> str:

@@ -55,7 +55,8 @@ def iou_by_visibility(comparison: Comparison) -> bytes:
     axes.set_yticks(np.linspace(0, 1, 6))
     axes.set_xlabel("visible share of the object", fontsize=9, color="#1b232d")
     axes.set_ylabel("mean IoU", fontsize=9, color="#1b232d")
-    axes.legend(fontsize=8, frameon=False, loc="upper center", ncols=2)
+    # Above the axes: bars of 1.00 have their numbers where a legend within would be.
+    axes.legend(fontsize=8, frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
     return png(figure)
 
 

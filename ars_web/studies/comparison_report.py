@@ -82,7 +82,7 @@ def offset_rows(comparison: Comparison) -> list[tuple[str, ...]]:
         found = comparison.rectangles[kind].offsets
         if found is not None:
             sides = (found.left, found.top, found.right, found.bottom)
-            rows.append((NAMES[kind], *(f"{side:+.2f}" for side in sides)))
+            rows.append((NAMES[kind], *(f"{side:+z.2f}" for side in sides)))
     return rows
 
 

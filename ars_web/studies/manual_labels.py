@@ -49,7 +49,7 @@ def manual_labels(labels: ForeignLabels, snapshot: SessionSnapshot, *, classes: 
     if not labels.images:
         raise BadFile(labels.source, "lists no image, so nothing tells which frames were labelled")
     frames, cameras = snapshot.frames, snapshot.cameras
-    matching = matched_images(labels, frames, cameras)
+    matching = matched_images(labels, frames, cameras, session=snapshot.id)
     labels = in_pixels(labels, matching, frames, cameras)
     drawn = [*labels.outlines, *labels.rectangles]
     _check_classes(drawn, snapshot, classes)

@@ -91,7 +91,7 @@ def test_runs_that_are_none_are_refused(text: str) -> None:
         (lambda c: c["annotations"][0].update(image_id=99), "annotation 1: there is no image 99"),
         (lambda c: c["annotations"][0].update(category_id=9), "annotation 1: there is no category 9"),
         (lambda c: c["annotations"][0].pop("image_id"), "annotations[0].image_id: Field required"),
-        (lambda c: c["images"][0].update(id=12), "two of its images have one id"),
+        (lambda c: c["images"][0].update(id=12), "image id 12 is there twice; ids tell images apart"),
         (lambda c: c["annotations"][0].update(segmentation=[[1, 2, 3, 4]]), "three corners at least"),
         (lambda c: c["annotations"][0].update(segmentation=[[1, 2, 3, 4, 5, 6, 7]]), "x and y of each"),
         (lambda c: c["annotations"][0].update(segmentation=[[1, 2, 3, float("nan"), 5, 6]]), "a list of numbers"),

@@ -70,6 +70,66 @@ def test_a_track_is_one_object_and_its_box_moves_evenly() -> None:
     assert all(image.is_index and image.size == (320, 240) for image in found.images)
 
 
+def test_frames_of_a_video_that_show_nothing_are_images_too() -> None:
+    """The head says 12 frames; tracks are in eight of them."""
+    found = read_labels(FILES / "cvat_video.xml")
+    assert sorted(image.number for image in found.images) == list(range(12))
+    assert {found.images[one.image].number for one in (*found.rectangles, *found.outlines)} == {*range(2, 8), 10}
+
+
+HEAD = "<size>12</size>"
+
+
+@pytest.mark.parametrize(
+    ("head", "numbers"),
+    [
+        ("<size>9</size><start_frame>2</start_frame><stop_frame>10</stop_frame>", range(2, 11)),
+        ("<start_frame>2</start_frame><stop_frame>10</stop_frame><frame_filter></frame_filter>", range(2, 11)),
+        # The last frame is the video's, not the last that is taken.
+        (
+            "<size>6</size><start_frame>0</start_frame><stop_frame>11</stop_frame><frame_filter>step=2</frame_filter>",
+            range(0, 12, 2),
+        ),
+        ("<size>12</size><start_frame>0</start_frame><stop_frame>0</stop_frame>", range(12)),
+    ],
+)
+def test_the_head_of_a_video_says_which_frames_it_has(changed, head: str, numbers: range) -> None:
+    file = changed("cvat_video.xml", HEAD, head)
+    # The polygons' second frame is no even one.
+    file.write_text(file.read_text().replace('frame="5"', 'frame="4"'))
+    found = read_labels(file)
+    assert sorted(image.number for image in found.images) == list(numbers)
+    boxed = [found.images[one.image].number for one in found.rectangles]
+    assert boxed == [number for number in (*range(2, 8), 10) if number in numbers]
+    if numbers.step == 2:
+        # Halfway from 2 to 6, as in the frames between.
+        np.testing.assert_allclose(found.rectangles[1].bbox, [14, 20, 34, 42])
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        # Tracks list frames beyond these: a job's places, or another task's.
+        "<size>8</size>",
+        "<size>4</size><start_frame>0</start_frame><frame_filter>step=3</frame_filter>",
+        "<size>12</size><frame_filter>every second</frame_filter>",
+        "",
+    ],
+)
+def test_a_head_that_does_not_fit_the_tracks_adds_no_frame(changed, head: str) -> None:
+    found = read_labels(changed("cvat_video.xml", HEAD, head))
+    assert sorted(image.number for image in found.images) == [*range(2, 8), 10]
+
+
+def test_a_jobs_places_are_numbers_where_there_is_no_step(changed) -> None:
+    text = changed("cvat_video.xml", HEAD, "<start_frame>1</start_frame><stop_frame>10</stop_frame>").read_text()
+    file = changed("cvat_video.xml", "<annotations>", "<annotations>")
+    file.write_text(text.replace("<task>", "<job>").replace("</task>", "</job>"))
+    assert sorted(image.number for image in read_labels(file).images) == list(range(1, 11))
+    file.write_text(file.read_text().replace("<mode>", "<frame_filter>step=1</frame_filter><mode>"))
+    assert len(read_labels(file).images) == 7
+
+
 def test_a_tracks_polygons_are_those_that_are_listed() -> None:
     found = read_labels(FILES / "cvat_video.xml")
     assert [found.images[one.image].number for one in found.outlines] == [2, 5]
@@ -99,6 +159,9 @@ def test_a_box_turns_the_shorter_way_round() -> None:
         ("cvat_video.xml", 'frame="10"', 'frame="x"', "frame holds 'x', which is no number"),
         ("cvat_video.xml", "<width>320</width>", "", ":8: <original_size> must hold width and height"),
         ("cvat_video.xml", 'frame="6"', 'frame="90000000"', "its tracks leave over 1000000 boxes"),
+        ("cvat_video.xml", HEAD, "<size>many</size>", ":6: <size> must hold a whole number of frames, not 'many'"),
+        ("cvat_video.xml", HEAD, "<size>90000000</size>", ":5: <task> says that it has 90000000 frames; over 1000000"),
+        ("cvat_video.xml", "</task>", "</task><task/>", ":11: track 0: the file holds 2 tasks, and the frames of each"),
     ],
 )
 def test_damage_is_named_with_its_line(changed, name: str, old: str, new: str, said: str) -> None:

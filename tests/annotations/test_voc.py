@@ -53,6 +53,11 @@ def test_pixels_are_counted_from_one_and_the_last_is_inside(write: Callable[...,
         assert (book.class_name, book.bbox.tolist()) == ("book", [4, 6, 5, 7])
 
 
+def test_an_empty_file_among_annotations_is_named(write: Callable[..., Path]) -> None:
+    with pytest.raises(BadFile, match=r"two\.xml:1: is not XML: no element found"):
+        read_labels(write(one=SOUND, two=""))
+
+
 def test_a_folder_is_one_set_and_an_image_may_show_nothing(write: Callable[..., Path]) -> None:
     nothing = "<annotation><size><width>0</width><height>0</height></size></annotation>"
     found = read_labels(write(one=SOUND, two=nothing))

@@ -55,7 +55,7 @@ def test_rows_are_rectangles_or_outlines_in_shares(write: Callable[..., Path]) -
         ("data.yaml", "path: .\ntrain: images/train\nnames:\n  0: 'no'\n  1: \"a: b\"\n"),
         ("data.yaml", "names: [no, 'a: b']  # two\nnc: 2\n"),
         ("data.yaml", "names:\n- no\n- 'a: b'\n"),
-        ("dataset.yaml", "names: {1: 'a: b', 0: no}\n"),
+        ("dataset.yaml", "names: {1: 'a: b', 7: bus, 0: no}\n"),
         ("classes.txt", "no\r\na: b\n\n"),
         ("obj.names", "\ufeffno\na: b"),
         ("labels/classes.txt", "no\na: b"),
@@ -89,7 +89,7 @@ def test_keypoints_after_a_rectangle_are_left_alone(write: Callable[..., Path]) 
 @pytest.mark.parametrize(
     ("row", "said"),
     [
-        ("2 0.5 0.5 0.1 0.1", "'2' is no class; known are 0 to 1"),
+        ("2 0.5 0.5 0.1 0.1", "class 2 is none of classes.txt's (0: cup, 1: book)"),
         ("cup 0.5 0.5 0.1 0.1", "'cup' is no class"),
         ("-1 0.5 0.5 0.1 0.1", "'-1' is no class"),
         ("1 0.5 0.5 0.1", "3 numbers follow the class"),
@@ -101,7 +101,7 @@ def test_keypoints_after_a_rectangle_are_left_alone(write: Callable[..., Path]) 
         ("1 0.5 1_0 0.1 0.1", "'1_0' is no number"),
         ("1 320 240 64 48", "320 is no share of the image's width or height, 0 to 1; divide pixels by them"),
         ("1 0.5 0.5 0 0.1", "width 0 and height 0.1 holds nothing"),
-        ("1 0.5 0.5 0.1 -0.1", "holds nothing; take it out"),
+        ("1 0.5 0.5 0.1 -0.1", "width 0.1 and height -0.1 must not be negative"),
         ("\u00b2 0.5 0.5 0.1 0.1", "is no class"),
     ],
 )
@@ -116,17 +116,29 @@ def test_a_broken_line_is_named(write: Callable[..., Path], row: str, said: str)
 @pytest.mark.parametrize(
     ("files", "said"),
     [
-        ({"data.yaml": "names: [cup\n", "a.txt": ""}, r"data\.yaml:2: is no YAML"),
-        ({"data.yaml": "names: cup\n", "a.txt": ""}, r"data\.yaml: `names` must be a list"),
-        ({"data.yaml": "names: {0: cup, 2: book}\n", "a.txt": ""}, "`names` must be a list"),
-        ({"data.yaml": "names: [cup, []]\n", "a.txt": ""}, "`names` must be a list"),
-        ({"data.yaml": "# names\n", "a.txt": ""}, "`names` must be a list"),
+        ({"data.yaml": "names: [cup\n", "a.txt": ""}, r"data\.yaml:1: is no YAML"),
+        (
+            {"data.yaml": "names: cup\n", "a.txt": ""},
+            r"data\.yaml: has no names; give the classes as a list, or by their numbers",
+        ),
+        (
+            {"data.yaml": "names: {0: cup, two: book}\n", "a.txt": ""},
+            "names: 'two': 'book' is no class; they are NUMBER",
+        ),
+        ({"data.yaml": "names: [cup, []]\n", "a.txt": ""}, "names: '1': .* is no class"),
+        ({"data.yaml": "# names\n", "a.txt": ""}, "is no mapping; it needs names"),
         ({"data.yaml": "names:\n" + "- " * 2_000, "a.txt": ""}, "nested too deeply"),
         ({"data.yaml": "names: [cup]\n" + "#" * (1 << 18), "a.txt": ""}, "over 256 KiB"),
         ({"data.yaml": b"names: [\xff\xfe]\n", "a.txt": ""}, "is no YAML"),
         ({"classes.txt": "cup\n\nbook\n", "a.txt": ""}, r"classes\.txt:2: a class without a name"),
+        ({"classes.txt": b"caf\xe9\n", "a.txt": ""}, r"classes\.txt: is not UTF-8; save it as UTF-8"),
+        ({"data.yaml": "names: []\n", "a.txt": ""}, r"data\.yaml: names no class"),
+        ({"data.yaml": "names: [a]\nkpt_shape: 9\n", "a.txt": ""}, "kpt_shape must be"),
         ({"classes.txt": "cup\n"}, "holds no label files"),
-        ({"classes.txt": "", "labels/a.txt": "0 0.5 0.5 1 1\n"}, "'0' is no class; known are none"),
+        (
+            {"classes.txt": "", "labels/a.txt": "0 0.5 0.5 1 1\n"},
+            r"a\.txt:1: class 0 is none of classes\.txt's \(which has none\)",
+        ),
         ({"classes.txt": "cup\n", "a.txt": "1\x000".encode("utf-16")}, r"a\.txt: is UTF-16"),
     ],
 )

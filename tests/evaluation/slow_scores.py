@@ -46,7 +46,7 @@ def voc_outcomes(truth: Truth, found: Predictions, class_: int, threshold: float
     outcomes: list[tuple[float, bool]] = []
     taken: set[int] = set()
     rows = [i for i in range(len(found.bbox)) if found.class_[i] == class_]
-    for row in sorted(rows, key=lambda i: (-found.score[i], found.image[i])):
+    for row in sorted(rows, key=lambda i: -found.score[i]):
         labels = np.flatnonzero((truth.image == found.image[row]) & (truth.class_ == class_))
         shared = [overlap(found.bbox[row], truth.bbox[i]) for i in labels]
         best = labels[int(np.argmax(shared))] if shared else -1

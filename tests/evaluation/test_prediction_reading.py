@@ -2,13 +2,17 @@
 
 import csv
 import json
+import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from ars_web import evaluation
 from ars_web.errors import BadFile, BadInput
+from ars_web.evaluation import prediction_reading, scoring, truth_reading
 from ars_web.evaluation.detections import Predictions, Truth
 from ars_web.evaluation.prediction_reading import read_predictions
 from ars_web.evaluation.scoring import evaluate
@@ -123,7 +127,7 @@ def test_images_are_named_by_path_name_or_stem(truth: Truth, tmp_path: Path) -> 
         ("0009.jpg,cube,1,2,3,4,97\n", "2: the score 97 is not between 0 and 1"),
         ("0009.jpg,cube,1,2,3,4,-0.1\n", "2: the score -0.1 is not between 0 and 1"),
         ("0009.jpg,cone,1,2,3,4,0.5\n", "2: class 'cone' is none of the truth's: cube, a "),
-        ("0010.jpg,cube,1,2,3,4,0.5\n", r"2: image '0010\.jpg' is not among the truth's 4 \(0003\.jpg, .*--split"),
+        ("0010.jpg,cube,1,2,3,4,0.5\n", r"2: image '0010\.jpg' is not among the truth's 4 \(0000\.jpg, .*--split"),
         ('0009.jpg,"cube,1,2,3,4,0.5\n', "2: unexpected end of data"),
     ],
 )
@@ -157,16 +161,18 @@ RESULT = {"image_id": 1, "category_id": 1, "bbox": [1, 2, 3, 4], "score": 0.5}
     [
         ({"image_id": 99}, r":9: result 1: image_id 99 is not among the truth's 4"),
         ({"image_id": "0010.jpg"}, r":9: result 1: image '0010\.jpg' is not among"),
-        ({"category_id": 7}, r":9: result 1: category_id 7 is none of the truth's \(1: cube, 2: "),
-        ({"category_id": "cone"}, ":9: result 1: class 'cone' is none"),
-        ({"bbox": [1, 2, -3, 4]}, ":9: result 1: bbox is x, y, width and height, the last two not negative"),
-        ({"bbox": [1, 2, float("nan"), 4]}, ":9: result 1: bbox is x, y, width and height"),
-        ({"bbox": [float("inf"), 2, 3, 4]}, ":9: result 1: the rectangle"),
-        ({"bbox": [1, 2, 3]}, ": result 1 bbox: "),
-        ({"score": float("nan")}, ":9: result 1: the score nan is not between 0 and 1"),
-        ({"score": 1.5}, ":9: result 1: the score 1.5 is not between 0 and 1"),
-        ({"score": "high"}, ":11: result 1 score: Input should be a valid number"),
-        ({"score": None}, ":11: result 1 score: "),
+        ({"category_id": 7}, r":10: result 1: category_id 7 is none of the truth's \(1: cube, 2: .*--classes"),
+        ({"category_id": "cone"}, ":10: result 1: class 'cone' is none"),
+        ({"bbox": [1, 2, -3, 4]}, ":11: result 1: bbox is x, y, width and height, the last two not negative"),
+        ({"bbox": [1, 2, float("nan"), 4]}, ":11: result 1: bbox is x, y, width and height"),
+        ({"bbox": [float("inf"), 2, 3, 4]}, ":11: result 1: the rectangle"),
+        ({"bbox": [1, 2, 3]}, ":11: result 1 bbox: "),
+        ({"image_id": 9}, r":9: result 1: image_id 9 .* not the numbers in their names: 0009\.jpg is \d"),
+        ({"image_id": "9"}, r":9: result 1: image '9' is not among"),
+        ({"score": float("nan")}, ":12: result 1: the score nan is not between 0 and 1"),
+        ({"score": 1.5}, ":12: result 1: the score 1.5 is not between 0 and 1"),
+        ({"score": "high"}, ":12: result 1 score: Input should be a valid number"),
+        ({"score": None}, ":12: result 1 score: "),
     ],
 )
 def test_a_bad_result_is_named(truth: Truth, tmp_path: Path, change: dict, said: str) -> None:
@@ -179,6 +185,61 @@ def test_a_bad_result_is_named(truth: Truth, tmp_path: Path, change: dict, said:
     (tmp_path / "found.json").write_text("[\n" + text + "\n]")
     with pytest.raises(BadFile, match=r"found\.json:?" + said):
         read_predictions(tmp_path / "found.json", truth)
+
+
+def test_what_a_result_lacks_is_named_with_the_line_on_which_it_begins(truth: Truth, tmp_path: Path) -> None:
+    file = tmp_path / "found.json"
+    for key in RESULT:
+        rows = [RESULT, {**RESULT, "more": ["},{", {"bbox": 1}]}, {k: v for k, v in RESULT.items() if k != key}]
+        file.write_text("[\n" + ",\n".join(map(json.dumps, rows)) + "]")
+        with pytest.raises(BadFile, match=rf"found\.json:4: result 2 has no {key}; a result needs .*"):
+            read_predictions(file, truth)
+
+
+def test_results_as_other_programs_write_them(truth: Truth, tmp_path: Path) -> None:
+    """Ids as texts or with a point, numbers as texts, masks and whatever else beside the rectangle, a UTF-8 mark."""
+    file, numbered = tmp_path / "found.json", truth.images[1].coco_id
+    changes = [
+        {"image_id": str(numbered)},
+        {"image_id": float(numbered or 0), "category_id": "1", "bbox": ["1", "2.0", 3.0, 4]},
+        {"image_id": truth.images[1].name, "category_id": "cube", "segmentation": {"size": [1, 1], "counts": "0"}},
+    ]
+    file.write_text(json.dumps([{**RESULT, **change} for change in changes]), encoding="utf-8-sig")
+    found = read_predictions(file, truth)
+    assert (found.image.tolist(), found.class_.tolist()) == ([1] * 3, [0] * 3)
+    assert found.bbox.tolist() == [[1, 2, 4, 6]] * 3
+
+
+def test_a_table_as_spreadsheets_write_it(truth: Truth, tmp_path: Path) -> None:
+    file = tmp_path / "found.csv"
+    name = '"a ""tall"" & <odd> one: #1"'
+    for content in (
+        HEADER + f"0009.jpg,{name},1,2,3,4,0.5\n\n   \n,,,,,,\n",
+        f'Score, X1, Y1, X0, Y0, Image, Class\n0.5, 3, 4, 1, 2, "0009.jpg", {name}\n',
+        HEADER.replace(",", ";") + f"0009.jpg;{name};1;2;3;4;0.5\n;;;;;;\n",
+        HEADER.replace(",", "\t") + f"0009.jpg\t{name}\t1\t2\t3\t4\t0.5\n",
+        HEADER.replace(",", '","').replace("image", '"image').replace("score", 'score"') + f"0009,{name},1,2,3,4,.5",
+    ):
+        file.write_bytes(b"\xef\xbb\xbf" + content.replace("\n", "\r\n").encode())
+        found = read_predictions(file, truth)
+        assert (found.class_.tolist(), found.bbox.tolist(), found.score.tolist()) == ([1], [[1, 2, 3, 4]], [0.5])
+    file.write_text(HEADER.replace("y1", "Y1,y1"))
+    with pytest.raises(BadFile, match=r"found\.csv:1: the header has y1 twice"):
+        read_predictions(file, truth)
+
+
+def test_class_numbers_in_a_table_must_be_said(truth: Truth, tmp_path: Path) -> None:
+    with pytest.raises(BadFile, match=r"found\.csv:2: class '1' is none .*; say by --classes what the numbers"):
+        read_csv(truth, tmp_path, "0009.jpg,1,1,2,3,4,0.5\n")
+    found = read_predictions(tmp_path / "found.csv", truth, class_names=CLASSES)
+    assert found.class_.tolist() == [1]
+
+
+def test_an_empty_file_is_named(truth: Truth, tmp_path: Path) -> None:
+    for name in ("found.csv", "found.json"):
+        (tmp_path / name).touch()
+        with pytest.raises(BadFile, match=rf"{name}: is empty"):
+            read_predictions(tmp_path / name, truth)
 
 
 def test_a_file_that_is_no_list_of_results_is_named(truth: Truth, tmp_path: Path) -> None:
@@ -214,8 +275,10 @@ def read_yolo(truth: Truth, folder: Path, rows: str, name: str = "0009", **optio
         ("0 0.5 0.5 0.2 0.2 0.9\n5 0.5 0.5 0.2 0.2 0.9\n", r"0009\.txt:2: class 5 is none of 0: cube, 1: a "),
         ("0 0.5 0.5 0.2 -0.2 0.9\n", r"0009\.txt:1: width 0\.2 and height -0\.2 must not be negative"),
         ("0 0.5 0.5 0.2 0.2 90\n", r"0009\.txt:1: the score 90 is not between 0 and 1"),
-        ("0 0.5 0.5 0.2 0.2 nan\n", r"0009\.txt:1: 'nan' is not a finite number"),
-        ("0 32 24 12 10 0.9\n", r"0009\.txt:1: 32 24 12 10 are no shares"),
+        ("0 0.5 0.5 0.2 0.2 nan\n", r"0009\.txt:1: 'nan' is no number"),
+        ("cube 0.5 0.5 0.2 0.2 0.9\n", r"0009\.txt:1: 'cube' is no class number; they are whole, from 0"),
+        ("0 0.5 0.5 0.2 0.2 0.9\xff\n", r"0009\.txt:1: '0\.9.' is no number"),
+        ("0 32 24 12 10 0.9\n", r"0009\.txt:1: 32 is no share of .*; divide pixels by them"),
     ],
 )
 def test_a_bad_row_of_yolo_is_named(truth: Truth, tmp_path: Path, rows: str, said: str) -> None:
@@ -231,6 +294,23 @@ def test_a_file_of_no_image_is_named(truth: Truth, tmp_path: Path) -> None:
         read_predictions(tmp_path / "found", truth)
     with pytest.raises(BadFile, match="holds no text file"):
         read_predictions(tmp_path / "found", truth, format="yolo")
+
+
+def test_a_detectors_folder_is_taken_as_it_is(truth: Truth, tmp_path: Path) -> None:
+    """Label files in labels/, beside pictures and a README."""
+    (tmp_path / "run" / "labels").mkdir(parents=True)
+    (tmp_path / "run" / "README.txt").write_text("by a detector")
+    (tmp_path / "run" / "labels" / "0009.txt").write_text("0 0.5 0.5 0.2 0.2 0.9\r\n")
+    renamed = replace(truth, images=tuple(replace(one, name=f"images/val/{one.name}") for one in truth.images))
+    for name in ("0009", "val/0009"):
+        target = tmp_path / "run" / "labels" / f"{name}.txt"
+        target.parent.mkdir(exist_ok=True)
+        (tmp_path / "run" / "labels" / "0009.txt").rename(target)
+        found = read_predictions(tmp_path / "run", renamed)
+        assert [renamed.images[place].name for place in found.image] == ["images/val/0009.jpg"]
+    (tmp_path / "run" / "0009.txt").write_text("")
+    with pytest.raises(BadFile, match=r"0009\.txt: is of the same image as .*0009\.txt; give the folder of one"):
+        read_predictions(tmp_path / "run", renamed)
 
 
 def test_class_numbers_can_be_said(truth: Truth, tmp_path: Path) -> None:
@@ -279,6 +359,18 @@ def test_predictions_of_a_class_that_is_labelled_nowhere_are_told(truth: Truth, 
     )
     found = read_yolo(few, tmp_path, "1 0.5 0.5 0.2 0.2 0.9\n")
     assert "1 predictions are of 'a \"tall\" & <odd> one: #1', which is labelled nowhere" in found.warnings[0]
+
+
+def test_the_packages_example_runs_as_it_is_written(truth: Truth, tmp_path: Path, monkeypatch) -> None:
+    shutil.copytree(GOLDEN / "coco", tmp_path / "dataset")
+    write_coco(read_truth(GOLDEN / "coco"), tmp_path / "results.json")
+    monkeypatch.chdir(tmp_path)
+    example = [line.strip() for line in (evaluation.__doc__ or "").splitlines() if line.startswith("    ")]
+    names: dict[str, object] = {"Path": Path}
+    names |= {module.__name__.rsplit(".", 1)[-1]: module for module in (prediction_reading, scoring, truth_reading)}
+    for line in example[:-1]:
+        exec(line, names)
+    assert eval(example[-1], names) == 1
 
 
 def test_what_is_not_there_or_not_known_is_named(truth: Truth, tmp_path: Path) -> None:

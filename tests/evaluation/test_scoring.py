@@ -1,6 +1,7 @@
 """Scores: against numbers worked by hand, against pycocotools, and against a slow oracle."""
 
 import importlib.util
+import json
 from contextlib import redirect_stdout
 from dataclasses import astuple, replace
 from io import StringIO
@@ -11,8 +12,10 @@ import pytest
 
 from ars_web.errors import BadInput
 from ars_web.evaluation.detections import Predictions, Truth
+from ars_web.evaluation.prediction_reading import read_predictions
 from ars_web.evaluation.scores import Evaluation
 from ars_web.evaluation.scoring import COCO_THRESHOLDS, evaluate
+from ars_web.evaluation.truth_reading import read_truth
 
 Case = tuple[Truth, Predictions]
 
@@ -140,6 +143,62 @@ def test_averages_and_curves_are_those_of_pycocotools(crowded: Case) -> None:
     assert detector.averages.at_50 == pytest.approx(means[2], abs=1e-6)
     assert detector.averages.coco == pytest.approx(means[2:].mean(), abs=1e-6)
     assert 0.1 < detector.averages.coco < 0.9
+
+
+def test_files_are_scored_as_pycocotools_scores_them(crowded: Case, tmp_path: Path) -> None:
+    """Images stand in the file in any order of ids, and categories too; of predictions of one score pycocotools takes
+    first what is in the image of the lower id."""
+    from pycocotools.coco import COCO
+    from pycocotools.cocoeval import COCOeval
+
+    truth, found = crowded
+    random = np.random.default_rng(3)
+    image_ids, class_ids = random.permutation(len(truth.images)) + 1, np.array([7, 3, 90, 4, 11])
+
+    def rows(of: Truth | Predictions) -> list[dict[str, object]]:
+        sides = np.concatenate([of.bbox[:, :2], of.bbox[:, 2:] - of.bbox[:, :2]], axis=1).tolist()
+        return [
+            {"image_id": int(image_ids[image]), "category_id": int(class_ids[class_]), "bbox": bbox}
+            for image, class_, bbox in zip(of.image, of.class_, sides, strict=True)
+        ]
+
+    labels = {
+        "images": [
+            {"id": int(id_), "file_name": image.name, "width": 640, "height": 480}
+            for id_, image in zip(image_ids, truth.images, strict=True)
+        ],
+        "categories": [{"id": int(id_), "name": name} for id_, name in zip(class_ids, truth.classes, strict=True)],
+        "annotations": [
+            # Of an outline, less than of the rectangle.
+            {**row, "id": i, "iscrowd": int(truth.crowd[i - 1]), "area": float(truth.area[i - 1] * 0.7)}
+            for i, row in enumerate(rows(truth), start=1)
+        ],
+    }
+    results = [{**row, "score": score} for row, score in zip(rows(found), found.score.tolist(), strict=True)]
+    (tmp_path / "labels.json").write_text(json.dumps(labels))
+    (tmp_path / "results.json").write_text(json.dumps(results))
+    with redirect_stdout(StringIO()):
+        theirs = COCO(str(tmp_path / "labels.json"))
+        evaluation = COCOeval(theirs, theirs.loadRes(str(tmp_path / "results.json")), "bbox")
+        evaluation.evaluate()
+        evaluation.accumulate()
+        evaluation.summarize()
+    read = read_truth(tmp_path / "labels.json")
+    detector = evaluate(read, [read_predictions(tmp_path / "results.json", read)]).detectors[0]
+    assert detector.coco is not None
+    assert astuple(detector.coco) == pytest.approx(evaluation.stats, abs=1e-6)
+    ours = (detector.averages.coco, detector.averages.at_50, detector.averages.at_75)
+    assert ours == pytest.approx(evaluation.stats[:3], abs=1e-6)
+
+
+def test_of_one_score_voc_takes_a_files_rows_in_their_order(make_truth, make_predictions) -> None:
+    truth = make_truth([(1, 0, (0, 0, 10, 10))])
+    right, wrong = (1, 0, (0, 0, 10, 10), 0.5), (0, 0, (0, 0, 10, 10), 0.5)
+    for rows, expected in (([right, wrong], 1.0), ([wrong, right], 0.5)):
+        averages = evaluate(truth, [make_predictions(rows)], coco=False).detectors[0].averages
+        assert (averages.voc_50, averages.voc07_50) == (expected, expected)
+        # COCO's rule takes the first image first, whatever the file's order.
+        assert averages.at_50 == 0.5
 
 
 def test_cocos_numbers_agree_with_ours_where_labels_are_ignored_without_being_crowds(scored: Evaluation) -> None:

@@ -12,6 +12,7 @@ import pytest
 
 from ars_web.errors import BadFile, BadInput
 from ars_web.evaluation.detections import Truth
+from ars_web.evaluation.prediction_reading import read_predictions
 from ars_web.evaluation.scoring import evaluate
 from ars_web.evaluation.truth_reading import read_truth
 
@@ -200,6 +201,43 @@ def test_difficult_objects_and_crowds_are_ignored(tmp_path: Path) -> None:
     assert truth.crowd.tolist() == [True, False, False]
 
 
+def test_voc_files_in_a_folder_of_their_own_are_read(tmp_path: Path) -> None:
+    """As label programs write them, beside the images or not."""
+    for file in (GOLDEN / "voc" / "Annotations").iterdir():
+        shutil.copy(file, tmp_path / file.name)
+    assert cv2.imwrite(str(tmp_path / "0009.jpg"), np.zeros((64, 48, 3), np.uint8))
+    truth = read_truth(tmp_path)
+    assert (truth.format, len(truth.images), len(truth.bbox)) == ("voc", 4, 12)
+    assert [one.file for one in truth.images if one.file] == [tmp_path / "0009.jpg"]
+
+
+def test_frames_of_a_cvat_video_are_found_by_name_and_number(tmp_path: Path) -> None:
+    """Frame 1 of 3 is labelled; pictures are called as CVAT calls them, or there are none."""
+    sides = 'xtl="1" ytl="2" xbr="3" ybr="4" outside="0"'
+    (tmp_path / "annotations.xml").write_text(
+        "<annotations><meta><task><size>3</size></task></meta>"
+        f'<track id="0" label="cup"><box frame="1" {sides}/></track></annotations>'
+    )
+    truth = read_truth(tmp_path)
+    assert sorted((image.name, image.coco_id) for image in truth.images) == [(f"frame_00000{i}", i) for i in range(3)]
+    assert truth.warnings == ()
+    (tmp_path / "found.json").write_text('[{"image_id": 2, "category_id": "cup", "bbox": [1, 2, 2, 2], "score": 1}]')
+    (tmp_path / "found.csv").write_text("image,class,x0,y0,x1,y1,score\nframe_000002.png,cup,1,2,3,4,1\n")
+    for name in ("found.json", "found.csv"):
+        found = read_predictions(tmp_path / name, truth)
+        assert [truth.images[place].name for place in found.image] == ["frame_000002"]
+        detector = evaluate(truth, [found], coco=False).detectors[0]
+        # In an empty frame, which is one of the truth's.
+        assert (detector.counts.tp, detector.averages.at_50) == (0, 0)
+    (tmp_path / "images").mkdir()
+    for number in range(3):
+        assert cv2.imwrite(str(tmp_path / "images" / f"{number:05d}.png"), np.zeros((6, 8, 3), np.uint8))
+    truth = read_truth(tmp_path)
+    assert sorted(image.name for image in truth.images) == [f"images/0000{i}.png" for i in range(3)]
+    assert all(image.file == tmp_path / image.name for image in truth.images)
+    assert any("splits are not read" in line for line in read_truth(GOLDEN / "cvat-video").warnings)
+
+
 def test_labels_that_are_odd_are_told(tmp_path: Path) -> None:
     rows = "0 0.5 0.5 0.2 0.2\n0 0.5 0.5 0.2 0.2\n0 0.5 0.5 0.2 0\n"
     folder = _yolo(tmp_path, "val: images\nnames: [a]\n", labels__x=rows)
@@ -237,17 +275,20 @@ def _rows(rows: str, yaml: str = "val: images\nnames: [a, b]\n") -> Callable[[Pa
 @pytest.mark.parametrize(
     ("write", "said"),
     [
-        (_rows("0 0.5 0.5 0.2\n"), r"x\.txt:1: has 3 numbers after the class; a row is class cx cy w h"),
-        (_rows("0 0.5 0.5 0.2 0.2\n0 0.5 0.5 0.2 0.2 0.9\n"), r"x\.txt:2: has 5 numbers"),
+        (_rows("0 0.5 0.5 0.2\n"), r"x\.txt:1: 3 numbers follow the class: a rectangle has four \(cx cy w h\)"),
+        (
+            _rows("0 0.5 0.5 0.2 0.2\n0 0.5 0.5 0.2 0.2 0.9\n"),
+            r"x\.txt:2: 5 numbers follow .* confidence: leave it out",
+        ),
         (
             _rows("0 0.5 0.5 0.2 0.2\n\n2 0.5 0.5 0.2 0.2\n"),
             r"x\.txt:3: class 2 is none of data\.yaml's \(0: a, 1: b\)",
         ),
         (_rows("0.5 0.5 0.5 0.2 0.2\n"), r"x\.txt:1: '0\.5' is no class number"),
-        (_rows("0 0.5 nan 0.2 0.2\n"), r"x\.txt:1: 'nan' is not a finite number"),
-        (_rows("0 0.5 wide 0.2 0.2\n"), r"x\.txt:1: 'wide' is not a finite number"),
+        (_rows("0 0.5 nan 0.2 0.2\n"), r"x\.txt:1: 'nan' is no number"),
+        (_rows("0 0.5 wide 0.2 0.2\n"), r"x\.txt:1: 'wide' is no number"),
         (_rows("0 0.5 0.5 -0.2 0.2\n"), r"x\.txt:1: width -0\.2 and height 0\.2 must not be negative"),
-        (_rows("0 320 240 100 50\n"), r"x\.txt:1: 320 240 100 50 are no shares of the image"),
+        (_rows("0 320 240 100 50\n"), r"x\.txt:1: 320 is no share of the image's width"),
         (_rows("\n"), "holds no label in its 1 images"),
         (_rows("", "val: images\nnames: [a, a]\n"), "two of its names are the same"),
         (_rows("", "val: images\n"), "has no names"),
@@ -257,6 +298,8 @@ def _rows(rows: str, yaml: str = "val: images\nnames: [a, b]\n") -> Callable[[Pa
         (_rows("", "val: {a: b}\nnames: [a]\n"), "val must be a path"),
         (_rows("", "val: images\nnames: [a\n"), r"data\.yaml:2: is no YAML"),
         (_rows("", "- a\n"), "is no mapping"),
+        (_rows("", "names:\n" + "- " * 2_000), r"data\.yaml: is nested too deeply"),
+        (_rows("0 0.5 0.5 1 1 0 0 2\n", "val: images\nnames: [a]\nkpt_shape: [2, 2]\n"), "four .* and 4 of keypoints"),
         (_rows("0 0.5 0.5 1 1\n", "val: images\nnames: [a]\nkpt_shape: 9\n"), "kpt_shape must be"),
         (
             _coco(lambda c: c["annotations"][1].update(bbox=[1, 2, -3, 4])),
@@ -277,8 +320,10 @@ def _rows(rows: str, yaml: str = "val: images\nnames: [a, b]\n") -> Callable[[Pa
         ),
         (_coco(lambda c: c["annotations"].clear()), "holds no label in its 1 images"),
         (_coco(lambda c: (c["annotations"].clear(), c["images"].clear())), "holds no image"),
-        (_voc("<xmax>", "<xmax>wide"), r"0009\.xml:\d+: <xmax>: 'wide\d+' is not a finite number"),
+        (_voc("<xmax>", "<xmax>wide"), r"0009\.xml:\d+: <xmax> holds 'wide\d+', which is no number"),
         (_voc("<xmin>", "<xmin>99"), r"0009\.xml:\d+: <bndbox>: .* ends before it begins"),
+        (_voc("<annotation>", "<nothing>"), r"0009\.xml:\d+: begins with <nothing>, not with <annotation>"),
+        (_voc("<width>48", "<width>48.5"), r"0009\.xml:\d+: <size> must hold width and height in whole pixels"),
         (_voc("<bndbox>", "<b/><x>"), r"0009\.xml:\d+: is not XML"),
         (_voc("<name>cube</name>", ""), r"0009\.xml:\d+: <object> has no name"),
         (_voc("<name>cube", "<name>cone"), r"dataset\.json: names no class 'cone'"),
@@ -306,6 +351,30 @@ def test_a_truth_that_is_not_there_is_named(tmp_path: Path) -> None:
     for kind in ("coco", "cvat"):
         with pytest.raises(BadFile):
             read_truth(tmp_path, format=kind)
+
+
+@pytest.mark.parametrize("kind", ["kitti", "tfrecord", "webdataset", "parquet", "bop", "dope", "masks", "compass"])
+def test_our_datasets_that_are_no_truth_say_what_to_give_instead(kind: str) -> None:
+    said = rf"is a dataset of the format {kind}; evaluate takes coco, yolo, voc, cvat and ars .* --format coco"
+    with pytest.raises(BadInput, match=said):
+        read_truth(GOLDEN / kind)
+
+
+@pytest.mark.parametrize(
+    ("file", "title"),
+    [
+        ("training/label_2/000000.txt", "KITTI"),
+        ("records/train.tfrecord-00000-of-00001", "TFRecord"),
+        ("shard-000000.tar", "WebDataset"),
+        ("labels.parquet", "Parquet"),
+        ("test/000001/scene_gt.json", "BOP"),
+    ],
+)
+def test_other_datasets_that_are_no_truth_say_what_to_give_instead(tmp_path: Path, file: str, title: str) -> None:
+    (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)
+    (tmp_path / file).touch()
+    with pytest.raises(BadInput, match=rf"looks like {title}; evaluate takes .* Convert it to a COCO file"):
+        read_truth(tmp_path)
 
 
 def test_an_empty_split_is_named(tmp_path: Path) -> None:

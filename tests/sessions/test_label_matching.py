@@ -46,6 +46,19 @@ def test_an_exact_name_goes_before_one_that_fits() -> None:
     assert found.problems == {0: TWO_IMAGES}
 
 
+def test_folders_tell_images_of_one_file_name_apart() -> None:
+    """As YOLO's label files have them, and as programs do that keep images elsewhere."""
+    frames = ["images/left/1.png", "images/right/1.png"]
+    found = match(frames, *named("labels/right/1.txt", "labels/left/1.txt", "set/images/left/2.png", "1.txt"))
+    assert found.frames == {0: 1, 1: 0}
+    assert found.problems == {2: NO_FRAME, 3: NO_FRAME}
+    # Of the left camera's frames alone, the right one's image fits by its file name, the left one's by more.
+    found = match(["images/left/1.png"], *named("labels/right/1.txt", "labels/left/1.txt"))
+    assert (found.frames, found.problems) == ({1: 0}, {0: TWO_IMAGES})
+    # A folder that fits goes before the file's ending.
+    assert match(["left/1.png", "right/1.jpg"], *named("left/1.jpg")).frames == {0: 0}
+
+
 def test_a_name_may_be_the_one_of_an_export() -> None:
     found = match(["left/1.png", "right/1.png", "caf\u00e9 2.jpg"], *named("left_1.png", "x/right_1.txt", "caf__2.jpg"))
     assert found.frames == {0: 0, 1: 1, 2: 2}

@@ -20,7 +20,7 @@ from ars_web.geometry.polygon import Polygon
 from ars_web.sessions.model import FrameTable, ObjectClass, SessionSnapshot, SessionState, VirtualBox
 from ars_web.studies.agreement import Agreement, Confusion
 from ars_web.studies.comparison import Comparison, compare
-from ars_web.studies.comparison_report import comparison_page
+from ars_web.studies.comparison_report import comparison_page, offset_rows
 
 CAMERA = Camera(200, 200, 100.0, 100.0, 99.5, 99.5)
 """A point at X, Y, Z lies at 100 + 100 X / Z, 100 + 100 Y / Z in image coordinates."""
@@ -289,12 +289,36 @@ def test_labels_that_are_all_narrower_are_told(make_session: Callable[..., Sessi
     assert any("that nothing hides overlap by 0.56 only" in line for line in found.warnings)
 
 
+def test_sides_that_are_where_they_should_be_have_one_sign(make_session: Callable[..., SessionSnapshot]) -> None:
+    found = study(make_session(names=MANY), cups(left=1e-4, right=-1e-4, top=1e-4, bottom=-1e-4))
+    assert offset_rows(found)[0][1:] == ("+0.00",) * 4
+
+
 def test_few_pairs_are_told(make_session: Callable[..., SessionSnapshot]) -> None:
     found = study(make_session(), by_hand(LABELS))
     assert any(line.startswith("Only 3 labels have a partner") for line in found.warnings)
 
 
-@pytest.mark.parametrize(("kind", "least"), [("yolo", 0.999), ("coco", 0.999), ("voc", 0.97), ("cvat", 0.99)])
+def test_an_empty_frame_of_a_video_counts(make_session: Callable[..., SessionSnapshot], tmp_path: Path) -> None:
+    """Three frames, a cup drawn in the middle one: in the other two the session's labels have no partner."""
+    sides = 'xtl="90" ytl="90" xbr="110" ybr="110" outside="0"'
+    (tmp_path / "annotations.xml").write_text(
+        "<annotations><meta><task><size>3</size></task></meta>"
+        f'<track id="0" label="cup"><box frame="1" {sides}/></track></annotations>'
+    )
+    found = study(make_session(), read_labels(tmp_path / "annotations.xml"))
+    assert [(one.name, one.manual, one.automatic, one.matched) for one in found.frames] == [
+        ("a.png", 0, 2, 0),
+        ("b.png", 1, 2, 1),
+        ("c.png", 0, 2, 0),
+    ]
+    total = found.rectangles["in_image"].total
+    assert (total.precision, total.recall, total.mean_iou) == (1 / 6, 1.0, pytest.approx(1.0))
+
+
+@pytest.mark.parametrize(
+    ("kind", "least"), [("yolo", 0.999), ("coco", 0.999), ("voc", 0.97), ("cvat", 0.99), ("cvat-video", 0.99)]
+)
 def test_our_own_exports_agree_with_the_session(
     make_session: Callable[..., SessionSnapshot], tmp_path: Path, kind: str, least: float
 ) -> None:
@@ -307,6 +331,21 @@ def test_our_own_exports_agree_with_the_session(
     assert total.mean_iou > least
     assert len(found.frames) == 3
     assert found.left_out == ()
+
+
+@pytest.mark.parametrize("kind", ["yolo", "coco", "voc", "cvat"])
+def test_an_export_of_two_sessions_is_compared_with_each(
+    make_session: Callable[..., SessionSnapshot], tmp_path: Path, kind: str
+) -> None:
+    """Their frames have the same names; names of files begin with the sessions' ids."""
+    first = make_session()
+    second = replace(first, id="s2")
+    options = ExportOptions.model_validate({"images": "none"})
+    run_export(plan_export([first, second], format=kind, options=options, out=tmp_path / "out"))
+    for session in (first, second):
+        found = study(session, read_labels(tmp_path / "out"))
+        assert [(one.name, one.manual, one.matched) for one in found.frames] == [(name, 3, 3) for name in NAMES]
+        assert any("3 of its 6 images are not compared" in note for note in found.notes)
 
 
 def test_a_report_escapes_names_and_needs_nothing_beside_it(make_session: Callable[..., SessionSnapshot]) -> None:
