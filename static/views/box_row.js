@@ -108,7 +108,7 @@ function RenameField({ box, onDone }) {
     if (wanted === "") return void (problem.value = "A box needs a name; Escape keeps the old one.");
     try {
       await store.actions.changeBox(box.id, { name: wanted });
-      leave();
+      if (typed.value.trim() === wanted) leave(); // else somebody types on
     } catch (error) {
       problem.value = /** @type {Error} */ (error).message;
     }

@@ -58,7 +58,7 @@ function SessionName() {
     busy.current = true;
     try {
       await store.actions.renameSession(wanted);
-      leave();
+      if (input.value.trim() === wanted) leave(); // else somebody types on
     } catch (error) {
       wrong.value = /** @type {Error} */ (error).message;
     }
