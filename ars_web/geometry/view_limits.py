@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -21,6 +22,7 @@ _POLE = 1e-9
 """Of a viewing direction of unit length: a horizontal part that is none."""
 
 Range = tuple[float, float]
+LimitName = Literal["distance", "height", "tilt"]
 
 
 @dataclass(frozen=True)
@@ -43,28 +45,30 @@ class ViewLimits:
 
     def __post_init__(self) -> None:
         """Raises BadInput for limits that nothing can keep to."""
-        for name, unit, (low, high) in (
-            ("distance", "metres", self.distance),
-            ("height", "metres", self.height),
-            ("tilt", "radians", self.tilt),
-        ):
-            if not (math.isfinite(low) and math.isfinite(high)):
-                raise BadInput(f"the limits of {name} must be finite numbers of {unit}, not {low} and {high}")
-            if max(abs(low), abs(high)) > FARTHEST:
-                raise BadInput(f"the limits of {name} must be within {FARTHEST:g} {unit}, not {low:g} and {high:g}")
-            if low > high:
-                raise BadInput(f"the limits of {name} are the wrong way round: {low:g} is more than {high:g}")
-        if self.distance[0] < 0 or self.distance[1] <= 0:
-            raise BadInput(f"a distance must be more than 0 m, not {self.distance[0]:g} to {self.distance[1]:g}")
-        if self.tilt[0] < -math.pi / 2 - 1e-9 or self.tilt[1] > math.pi / 2 + 1e-9:
-            low, high = (math.degrees(angle) for angle in self.tilt)
-            raise BadInput(
-                f"a tilt lies between -90 degrees, straight up, and 90, straight down, not {low:g} to {high:g}"
-            )
+        check_range("distance", self.distance)
+        check_range("height", self.height)
+        check_range("tilt", self.tilt)
         if not 0.0 <= self.min_visible <= 1.0:
             raise BadInput(f"the share that must be visible is from 0 to 1, not {self.min_visible}")
         if not (math.isfinite(self.clearance) and self.clearance >= 0):
             raise BadInput(f"the clearance must be 0 m or more, not {self.clearance}")
+
+
+def check_range(name: LimitName, limits: Range) -> None:
+    """Raises BadInput where nothing can keep to the limits of that name; a tilt is said in degrees, as people think of
+    it."""
+    unit = "metres" if name != "tilt" else "degrees"
+    low, high = limits if name != "tilt" else (math.degrees(limits[0]), math.degrees(limits[1]))
+    if not (math.isfinite(low) and math.isfinite(high)):
+        raise BadInput(f"the limits of {name} must be finite numbers of {unit}, not {low:g} and {high:g}")
+    if name == "tilt" and (low < -90.0 - 1e-7 or high > 90.0 + 1e-7):
+        raise BadInput(f"a tilt lies between -90 degrees, straight up, and 90, straight down, not {low:g} to {high:g}")
+    if max(abs(low), abs(high)) > FARTHEST:
+        raise BadInput(f"the limits of {name} must be within {FARTHEST:g} {unit}, not {low:g} and {high:g}")
+    if low > high:
+        raise BadInput(f"the limits of {name} are the wrong way round: {low:g} is more than {high:g} {unit}")
+    if name == "distance" and (low < 0 or high <= 0):
+        raise BadInput(f"a distance must be more than 0 m, not {low:g} to {high:g}")
 
 
 def looking_at(eyes_world: Float[np.ndarray, "m 3"], targets_world: Float[np.ndarray, "m 3"]) -> np.ndarray:

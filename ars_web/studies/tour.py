@@ -18,7 +18,7 @@ from ars_web.geometry.box import Box
 from ars_web.geometry.rigid_transform import Transform
 from ars_web.geometry.sphere_bins import SphereBins
 from ars_web.geometry.view_directions import view_directions
-from ars_web.geometry.view_limits import HALF_SEEN, Range, ViewLimits, check_room, tilts_of
+from ars_web.geometry.view_limits import HALF_SEEN, LimitName, Range, ViewLimits, check_range, check_room, tilts_of
 from ars_web.geometry.view_proposals import (
     REASONS,
     Proposals,
@@ -93,6 +93,10 @@ class TourRequest:
             )
         if self.min_visible is not None and not 0.0 <= self.min_visible <= 1.0:
             raise BadInput(f"the share that must be visible is from 0 to 1, not {self.min_visible}")
+        given: dict[LimitName, Range | None] = {"distance": self.distance, "height": self.height, "tilt": self.tilt}
+        for name, limits in given.items():
+            if limits is not None:
+                check_range(name, limits)
 
     @property
     def options(self) -> ExportOptions:

@@ -50,7 +50,7 @@ def test_straight_down_and_up_the_image_s_x_is_the_world_s() -> None:
     [
         ({"distance": (0.6, 0.3)}, "the limits of distance are the wrong way round: 0.6 is more than 0.3"),
         ({"height": (0.6, 0.3)}, "the limits of height are the wrong way round"),
-        ({"tilt": (0.6, 0.3)}, "the limits of tilt are the wrong way round"),
+        ({"tilt": (0.6, 0.3)}, "the limits of tilt are the wrong way round: 34.3775 is more than 17.1887 degrees"),
         ({"distance": (math.nan, 0.3)}, "the limits of distance must be finite numbers of metres, not nan and 0.3"),
         ({"height": (0.0, math.inf)}, "the limits of height must be finite numbers of metres"),
         ({"distance": (0.3, 1e300)}, "the limits of distance must be within 1e\\+07 metres"),
