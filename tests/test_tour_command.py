@@ -13,6 +13,7 @@ import pytest
 from ars_web.cli import run
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box
+from ars_web.geometry.symmetry import turn_about
 from ars_web.recordings.recording import RecordedBox
 from ars_web.recordings.registry import read_recording
 from ars_web.sessions.store import SessionStore
@@ -142,3 +143,20 @@ def test_a_file_is_written_whole_or_not_at_all(command: Command, tmp_path: Path,
     _, err = command("--count", "1", "--out", str(taken), *FEW, status=1)
     assert err.startswith(f"ars-web: {taken} cannot be written: Is a directory; name a file in a folder")
     assert [one.name for one in taken.parent.iterdir()] == [name]
+
+
+def test_a_world_whose_z_may_not_be_up_is_doubted(command: Command, tmp_path: Path, ring_scene: ModuleType) -> None:
+    assert "off the world's z" not in command("--count", "1", *FEW)[0]
+    sessions = tmp_path / "on_side"
+    on_side = np.eye(4)
+    on_side[:3, :3] = turn_about(np.array([1.0, 0.0, 0.0]), np.pi / 2)
+    read = read_recording(ring_scene.write(tmp_path / "ring"))
+    frames = [replace(one, T_world_camera=on_side @ one.T_world_camera) for one in read.frames]
+    T = np.eye(4)
+    T[:3, 3] = on_side[:3, :3] @ ring_scene.CENTRE
+    ball = RecordedBox("ball", Box(T, np.full(3, 0.08)))
+    with SessionStore(sessions) as store:
+        store.create(replace(read, frames=frames, class_names=("ball",), boxes=(ball,)), name="ring")
+    lines = command("--count", "1", *FEW, sessions=sessions)[0].splitlines()
+    (doubt,) = (line for line in lines if "off the world's z" in line)
+    assert doubt.startswith("the cameras are level about an axis 90 degrees off the world's z: if that is not up,")

@@ -21,6 +21,10 @@ HALF_SEEN = 0.5
 _POLE = 1e-9
 """Of a viewing direction of unit length: a horizontal part that is none."""
 
+_TURNED, _LEVEL = 0.05, 0.1
+"""Mean squares: of how far the x axes of images leave one line at least, where cameras look many ways; and, as a share
+of it, of how far they leave one plane at most, where they are held level."""
+
 Range = tuple[float, float]
 LimitName = Literal["distance", "height", "tilt"]
 
@@ -90,6 +94,19 @@ def looking_at(eyes_world: Float[np.ndarray, "m 3"], targets_world: Float[np.nda
 def tilts_of(Ts_world_camera: Float[np.ndarray, "m 4 4"]) -> Float[np.ndarray, "m"]:
     """How far each camera's axis points below the horizontal, radians."""
     return np.arcsin(np.clip(-Ts_world_camera[:, 2, 2], -1.0, 1.0))
+
+
+def lean_of_world(Ts_world_camera: Float[np.ndarray, "n 4 4"]) -> float:
+    """By how much the axis about which cameras are level is off the world's z, radians in [0, pi / 2].
+
+    Cameras that are held level have the x of their images across what is up, whichever way they look. Where they look
+    too few ways to tell, or are not held level, 0: then nothing speaks against z.
+    """
+    across = Ts_world_camera[:, :3, 0]
+    spread, axes = np.linalg.eigh(across.T @ across / max(len(across), 1))
+    if spread[1] < _TURNED or spread[0] > _LEVEL * spread[1]:
+        return 0.0
+    return float(np.arccos(min(abs(axes[2, 0]), 1.0)))
 
 
 def check_room(limits: ViewLimits, boxes: Sequence[Box]) -> None:
