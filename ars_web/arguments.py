@@ -375,11 +375,12 @@ def _refused(error: "ValidationError") -> typer.BadParameter:
     fault = error.errors()[0]
     names = [part for part in fault["loc"] if isinstance(part, str)]
     option = SPELLED_DIFFERENTLY.get(names[0], "--" + "-".join(names).replace("_", "-")) if names else None
+    message = fault["msg"].removeprefix("Value error, ")
     if names == ["split"]:
-        option = "--split-train, --split-val, --split-test"
+        of_held_out = message.startswith("hold_out")
+        option = "--split-hold-out" if of_held_out else "--split-train, --split-val, --split-test"
     elif names == ["frames"]:
         option = "--frames-..."
-    message = fault["msg"].removeprefix("Value error, ")
     given = "" if isinstance(fault["input"], dict) else f", not {fault['input']}"
     return typer.BadParameter(f"{message}{given}", param_hint=option)
 

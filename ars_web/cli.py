@@ -431,6 +431,7 @@ def run(arguments: Sequence[str]) -> int:
         return 1
     except typer.TyperException as error:
         command = getattr(getattr(error, "ctx", None), "command_path", "ars-web")
+        _name_refused_value(error)
         _fail(f"{error.format_message()} (see `{command} --help`)")
         return error.exit_code
     except ArsError as error:
@@ -440,6 +441,16 @@ def run(arguments: Sequence[str]) -> int:
         _fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))
         return 1
     return status if isinstance(status, int) else 0
+
+
+def _name_refused_value(error: typer.TyperException) -> None:
+    """Add to the message what was given, which pydantic's, of a number beyond its limits, does not say."""
+    from pydantic import ValidationError
+
+    if isinstance(error.__cause__, ValidationError):
+        fault = error.__cause__.errors()[0]
+        said, given = fault["msg"].removeprefix("Value error, ").rstrip("."), str(fault["input"])
+        error.message = said if given in said else f"{said}, not {given}"
 
 
 def _fail(message: str) -> None:

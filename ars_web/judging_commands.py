@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ars_web import arguments as take
-from ars_web.errors import BadInput
 from ars_web.terminal import note, print_json, print_table, progress, write_json
 
 if TYPE_CHECKING:
@@ -74,11 +73,7 @@ def compare(
             snapshot, by_hand, options=options, iou=iou, classes=names, worst=worst, progress=advance
         )
     if out is not None:
-        page = report.comparison_page(found, snapshot, name=name)
-        try:
-            write_page(page, out)
-        except OSError as error:
-            raise BadInput(f"{out} cannot be written: {error.strerror}; choose another place") from error
+        write_page(report.comparison_page(found, snapshot, name=name), out)
     if as_json:
         print_json(found)
         return

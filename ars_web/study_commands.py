@@ -33,6 +33,7 @@ def coverage(
     look alike count as one.
     """
     from ars_web.datasets.coverage import called, chosen_boxes, coverage_of, session_views
+    from ars_web.reporting.whole_file import write_whole
     from ars_web.sessions.store import SessionStore
     from ars_web.studies.coverage_json import coverage_json
     from ars_web.studies.coverage_picture import coverage_png
@@ -48,7 +49,7 @@ def coverage(
     found = coverage_of(views, of.bins, chosen)
     if out is not None and out.suffix.lower() == ".png":
         title = f"{snapshot.state.name}: {called(snapshot, **objects)}"
-        out.write_bytes(coverage_png(found, title=title))
+        write_whole(out, coverage_png(found, title=title))
     elif out is not None:
         write_json(out, coverage_json(found).model_dump(mode="json"))
     if as_json:
@@ -127,6 +128,7 @@ def tour(
     from ars_web.datasets.coverage import chosen_boxes, session_views
     from ars_web.errors import BadInput
     from ars_web.recordings.ars import camera_in_wrist
+    from ars_web.reporting.whole_file import write_whole
     from ars_web.sessions.store import SessionStore
     from ars_web.studies.tour import TourRequest, plan_tour, recorded_wrist
     from ars_web.studies.tour_json import tour_json, wrist_rows
@@ -134,16 +136,19 @@ def tour(
     if out is not None and out.suffix.lower() not in (".json", ".txt"):
         raise typer.BadParameter(f"{out} ends neither in .json nor in .txt", param_hint="--out")
     degrees = take.number_range(tilt, "--tilt")
-    request = TourRequest(
-        bins=of.bins,
-        count=count,
-        distance=take.number_range(distance, "--distance"),
-        height=take.number_range(height, "--height"),
-        tilt=None if degrees is None else (math.radians(degrees[0]), math.radians(degrees[1])),
-        min_visible=min_visible,
-        shape=of.shape,
-        start_frame=start_frame,
-    )
+    try:
+        request = TourRequest(
+            bins=of.bins,
+            count=count,
+            distance=take.number_range(distance, "--distance"),
+            height=take.number_range(height, "--height"),
+            tilt=None if degrees is None else (math.radians(degrees[0]), math.radians(degrees[1])),
+            min_visible=min_visible,
+            shape=of.shape,
+            start_frame=start_frame,
+        )
+    except BadInput as error:
+        raise typer.BadParameter(str(error)) from error
     with SessionStore(sessions) as store:
         summary = store.summary(store.find(session))
         snapshot = store.snapshot(summary.id)
@@ -159,7 +164,7 @@ def tour(
     found = plan_tour(snapshot, session_views(snapshot, request.options), chosen, request)
     told = tour_json(found, T_wrist_camera=T_wrist_camera)
     if out is not None and T_wrist_camera is not None and wants_wrist:
-        out.write_text(wrist_rows(found, T_wrist_camera))
+        write_whole(out, wrist_rows(found, T_wrist_camera).encode())
     elif out is not None:
         write_json(out, told.model_dump(mode="json"))
     if as_json:

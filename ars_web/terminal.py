@@ -37,9 +37,9 @@ def print_json(value: object) -> None:
 
 def write_json(file: Path, value: object) -> None:
     """`value` as JSON in a file, whole or not at all."""
-    part = file.with_name(f".{file.name}.part")
-    part.write_bytes(json_bytes(value))
-    part.replace(file)
+    from ars_web.reporting.whole_file import write_whole
+
+    write_whole(file, json_bytes(value))
 
 
 def _json_value(value: object) -> str:

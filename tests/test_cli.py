@@ -255,6 +255,10 @@ def test_json_is_all_there_is_on_stdout(
         (("export", "SESSION", "--format", "yolo", "--out", "D", "--frames-list", "1,x"), "--frames-list"),
         (("export", "SESSION", "--format", "yolo", "--out", "D", "--frames-list", "1", "--frames-step", "2"), "both"),
         (("export", "SESSION", "--format", "yolo", "--out", "D", "--split-train", "0.9"), "--split-train"),
+        (
+            ("export", "SESSION", "--format", "yolo", "--out", "D", "--split-hold-out", "SESSION"),
+            "value for --split-hold-out:",
+        ),
         (("export", "SESSION", "--format", "yolo", "--out", "D", "--images", "steal"), "--images"),
         (("export", "SESSION", "--format", "yolo", "--out", "D", "--heading-bins", "8"), "an option of compass"),
         (("export", "SESSION", "--format", "yolo", "--out", "memory://a/b", "--check"), "not read back"),

@@ -66,10 +66,11 @@ def test_coverage_is_written_as_picture_and_as_json(command: Command, tmp_path: 
     [
         (("--out", "c.gif"), 2, "c.gif ends neither in .png nor in .json"),
         (("--box", "0", "--class", "ball"), 2, "not both"),
-        (("--box", "7"), 1, "has no box 7"),
+        (("--box", "7"), 1, "has no box 7; its boxes are: 1 ball"),
         (("--class", "dragon"), 1, "no class 'dragon'"),
         (("--class", "cube"), 1, "class 'cube' has no box: it is never labelled"),
-        (("--azimuth-bins", "0"), 2, "azimuth-bins"),
+        (("--azimuth-bins", "0"), 2, "'--azimuth-bins': Input should be greater than or equal to 1, not 0 (see"),
+        (("--shape", "ball"), 2, "'--shape': 'ball' is not one of 'box', 'hull', 'mesh' (see"),
         (("--min-visible", "2"), 2, "min-visible"),
     ],
 )
@@ -78,3 +79,14 @@ def test_what_is_wrong_is_said(command: Command, options: tuple[str, ...], statu
     assert out == ""
     assert said in err
     assert len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("name", ["c.png", "c.json"])
+def test_a_file_is_written_whole_or_not_at_all(command: Command, tmp_path: Path, name: str) -> None:
+    new, taken = tmp_path / "new" / name, tmp_path / "taken" / name
+    command("coverage", "--out", str(new))
+    assert [one.name for one in new.parent.iterdir()] == [name]
+    (taken / "inside").mkdir(parents=True)
+    _, err = command("coverage", "--out", str(taken), status=1)
+    assert err.startswith(f"ars-web: {taken} cannot be written: Is a directory; name a file in a folder")
+    assert [one.name for one in taken.parent.iterdir()] == [name]

@@ -13,6 +13,7 @@ import pytest
 from ars_web.cli import run
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box
+from ars_web.geometry.symmetry import turn_about
 from ars_web.recordings.recording import RecordedBox
 from ars_web.recordings.registry import read_recording
 from ars_web.sessions.store import SessionStore
@@ -108,20 +109,22 @@ def test_what_is_full_is_said(command: Command) -> None:
     [
         (("--out", "tour.csv"), 2, "tour.csv ends neither in .json nor in .txt"),
         (("--box", "0", "--class", "ball"), 2, "not both"),
-        (("--box", "7"), 1, "has no box 7"),
+        (("--box", "7"), 1, "has no box 7; its boxes are: 1 ball"),
         (("--class", "dragon"), 1, "no class 'dragon'"),
         (("--class", "cube"), 1, "class 'cube' has no box: it is never labelled"),
-        (("--count", "0"), 2, "count"),
+        (("--count", "0"), 2, "'--count': Input should be greater than or equal to 1, not 0 (see"),
         (("--distance", "0.5"), 2, "'0.5' must be two numbers with a colon between"),
         (("--distance", "near:far"), 2, "'near:far' must be two numbers"),
-        (("--distance", "0.9:0.3"), 1, "the limits of distance are the wrong way round: 0.9 is more than 0.3"),
-        (("--distance", "-1:0.3"), 1, "a distance must be more than 0 m"),
-        (("--distance", "nan:1"), 1, "the limits of distance must be finite numbers of metres"),
-        (("--tilt", "-100:0"), 1, "a tilt lies between -90 degrees"),
+        (("--distance", "0.9:0.3"), 2, "the limits of distance are the wrong way round: 0.9 is more than 0.3 metres"),
+        (("--distance", "-1:0.3"), 2, "a distance must be more than 0 m"),
+        (("--distance", "nan:1"), 2, "the limits of distance must be finite numbers of metres"),
+        (("--tilt", "-100:0"), 2, "a tilt lies between -90 degrees, straight up, and 90, straight down, not -100 to 0"),
+        (("--tilt", "20:10"), 2, "the limits of tilt are the wrong way round: 20 is more than 10 degrees"),
+        (("--tilt", "nan:20"), 2, "the limits of tilt must be finite numbers of degrees, not nan and 20"),
         (("--height", "7:8"), 1, "no camera is 7 to 8 m high"),
-        (("--min-visible", "2"), 1, "from 0 to 1, not 2.0"),
+        (("--min-visible", "2"), 2, "from 0 to 1, not 2.0"),
         (("--start-frame", "12"), 1, "no frame 12; its frames are 0 to 11"),
-        (("--azimuth-bins", "360"), 1, "at most 2592 cells"),
+        (("--azimuth-bins", "360"), 2, "at most 2592 cells"),
     ],
 )
 def test_what_is_wrong_is_said(command: Command, options: tuple[str, ...], status: int, said: str) -> None:
@@ -129,3 +132,31 @@ def test_what_is_wrong_is_said(command: Command, options: tuple[str, ...], statu
     assert out == ""
     assert said in err
     assert len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("name", ["tour.txt", "tour.json"])
+def test_a_file_is_written_whole_or_not_at_all(command: Command, tmp_path: Path, name: str) -> None:
+    new, taken = tmp_path / "new" / name, tmp_path / "taken" / name
+    command("--count", "1", "--out", str(new), *FEW)
+    assert [one.name for one in new.parent.iterdir()] == [name]
+    (taken / "inside").mkdir(parents=True)
+    _, err = command("--count", "1", "--out", str(taken), *FEW, status=1)
+    assert err.startswith(f"ars-web: {taken} cannot be written: Is a directory; name a file in a folder")
+    assert [one.name for one in taken.parent.iterdir()] == [name]
+
+
+def test_a_world_whose_z_may_not_be_up_is_doubted(command: Command, tmp_path: Path, ring_scene: ModuleType) -> None:
+    assert "off the world's z" not in command("--count", "1", *FEW)[0]
+    sessions = tmp_path / "on_side"
+    on_side = np.eye(4)
+    on_side[:3, :3] = turn_about(np.array([1.0, 0.0, 0.0]), np.pi / 2)
+    read = read_recording(ring_scene.write(tmp_path / "ring"))
+    frames = [replace(one, T_world_camera=on_side @ one.T_world_camera) for one in read.frames]
+    T = np.eye(4)
+    T[:3, 3] = on_side[:3, :3] @ ring_scene.CENTRE
+    ball = RecordedBox("ball", Box(T, np.full(3, 0.08)))
+    with SessionStore(sessions) as store:
+        store.create(replace(read, frames=frames, class_names=("ball",), boxes=(ball,)), name="ring")
+    lines = command("--count", "1", *FEW, sessions=sessions)[0].splitlines()
+    (doubt,) = (line for line in lines if "off the world's z" in line)
+    assert doubt.startswith("the cameras are level about an axis 90 degrees off the world's z: if that is not up,")

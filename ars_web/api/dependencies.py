@@ -7,6 +7,8 @@ from typing import Annotated, Any
 
 import orjson
 from fastapi import Depends, Header, Request, Response
+from fastapi.dependencies.models import Dependant
+from fastapi.exceptions import RequestValidationError
 from fastapi.requests import HTTPConnection
 from fastapi.routing import APIRoute
 
@@ -143,16 +145,28 @@ class _StrictRequest(Request):
 
 
 class StrictRoute(APIRoute):
-    """A route whose JSON bodies are JSON."""
+    """A route whose JSON bodies are JSON, and which refuses parameters of a query that it does not know: one that is
+    misspelt would silently count for nothing."""
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         """FastAPI's handler, given a strict request."""
-        handler = super().get_route_handler()
+        handler, known = super().get_route_handler(), _query_names(self.dependant)
 
         async def strict(request: Request) -> Response:
+            unknown = [name for name in request.query_params if name not in known]
+            if unknown:
+                raise RequestValidationError(
+                    [{"type": "extra_forbidden", "loc": ("query", name), "msg": "", "input": None} for name in unknown]
+                )
             return await handler(_StrictRequest(request.scope, request.receive))
 
         return strict
+
+
+def _query_names(dependant: Dependant) -> set[str]:
+    """What a handler, and what it depends on, take of a query."""
+    found = {field.alias for field in dependant.query_params}
+    return found.union(*map(_query_names, dependant.dependencies))
 
 
 class JsonResponse(Response):

@@ -19,7 +19,10 @@ from ars_web.geometry.frame_blocks import over_blocks
 from ars_web.geometry.sphere_bins import SphereBins
 from ars_web.geometry.symmetry import Symmetry
 from ars_web.geometry.view_directions import reachable, view_directions
-from ars_web.sessions.model import SessionSnapshot
+from ars_web.sessions.model import SessionSnapshot, SessionState
+
+SHOWN = 20
+"""Boxes that are named where another was asked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,7 +181,7 @@ def chosen_boxes(snapshot: SessionSnapshot, *, box_id: int | None = None, class_
     if box_id is not None and class_id is not None:
         raise BadInput("give a box or a class, not both: a box is of one class")
     if box_id is not None and box_id not in state.boxes:
-        raise NotFound(f"session {snapshot.id} has no box {box_id}")
+        raise NotFound(f"session {snapshot.id} has no box {box_id}{_there_are(state)}")
     if class_id is not None and class_id not in state.classes:
         raise NotFound(f"session {snapshot.id} has no class {class_id}")
     found = [
@@ -193,6 +196,13 @@ def chosen_boxes(snapshot: SessionSnapshot, *, box_id: int | None = None, class_
     if not found:
         raise NotFound(f"session {snapshot.id} has no box yet; make one first")
     return found
+
+
+def _there_are(state: SessionState) -> str:
+    """What boxes there are instead, as the end of a sentence."""
+    known = [f"{i} {box.name}".rstrip() for i, box in sorted(state.boxes.items())]
+    more = f" and {len(known) - SHOWN} more" if len(known) > SHOWN else ""
+    return f"; its boxes are: {', '.join(known[:SHOWN])}{more}" if known else "; it has none yet"
 
 
 def called(snapshot: SessionSnapshot, *, box_id: int | None = None, class_id: int | None = None) -> str:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -20,7 +21,12 @@ HALF_SEEN = 0.5
 _POLE = 1e-9
 """Of a viewing direction of unit length: a horizontal part that is none."""
 
+_TURNED, _LEVEL = 0.05, 0.1
+"""Mean squares: of how far the x axes of images leave one line at least, where cameras look many ways; and, as a share
+of it, of how far they leave one plane at most, where they are held level."""
+
 Range = tuple[float, float]
+LimitName = Literal["distance", "height", "tilt"]
 
 
 @dataclass(frozen=True)
@@ -43,28 +49,30 @@ class ViewLimits:
 
     def __post_init__(self) -> None:
         """Raises BadInput for limits that nothing can keep to."""
-        for name, unit, (low, high) in (
-            ("distance", "metres", self.distance),
-            ("height", "metres", self.height),
-            ("tilt", "radians", self.tilt),
-        ):
-            if not (math.isfinite(low) and math.isfinite(high)):
-                raise BadInput(f"the limits of {name} must be finite numbers of {unit}, not {low} and {high}")
-            if max(abs(low), abs(high)) > FARTHEST:
-                raise BadInput(f"the limits of {name} must be within {FARTHEST:g} {unit}, not {low:g} and {high:g}")
-            if low > high:
-                raise BadInput(f"the limits of {name} are the wrong way round: {low:g} is more than {high:g}")
-        if self.distance[0] < 0 or self.distance[1] <= 0:
-            raise BadInput(f"a distance must be more than 0 m, not {self.distance[0]:g} to {self.distance[1]:g}")
-        if self.tilt[0] < -math.pi / 2 - 1e-9 or self.tilt[1] > math.pi / 2 + 1e-9:
-            low, high = (math.degrees(angle) for angle in self.tilt)
-            raise BadInput(
-                f"a tilt lies between -90 degrees, straight up, and 90, straight down, not {low:g} to {high:g}"
-            )
+        check_range("distance", self.distance)
+        check_range("height", self.height)
+        check_range("tilt", self.tilt)
         if not 0.0 <= self.min_visible <= 1.0:
             raise BadInput(f"the share that must be visible is from 0 to 1, not {self.min_visible}")
         if not (math.isfinite(self.clearance) and self.clearance >= 0):
             raise BadInput(f"the clearance must be 0 m or more, not {self.clearance}")
+
+
+def check_range(name: LimitName, limits: Range) -> None:
+    """Raises BadInput where nothing can keep to the limits of that name; a tilt is said in degrees, as people think of
+    it."""
+    unit = "metres" if name != "tilt" else "degrees"
+    low, high = limits if name != "tilt" else (math.degrees(limits[0]), math.degrees(limits[1]))
+    if not (math.isfinite(low) and math.isfinite(high)):
+        raise BadInput(f"the limits of {name} must be finite numbers of {unit}, not {low:g} and {high:g}")
+    if name == "tilt" and (low < -90.0 - 1e-7 or high > 90.0 + 1e-7):
+        raise BadInput(f"a tilt lies between -90 degrees, straight up, and 90, straight down, not {low:g} to {high:g}")
+    if max(abs(low), abs(high)) > FARTHEST:
+        raise BadInput(f"the limits of {name} must be within {FARTHEST:g} {unit}, not {low:g} and {high:g}")
+    if low > high:
+        raise BadInput(f"the limits of {name} are the wrong way round: {low:g} is more than {high:g} {unit}")
+    if name == "distance" and (low < 0 or high <= 0):
+        raise BadInput(f"a distance must be more than 0 m, not {low:g} to {high:g}")
 
 
 def looking_at(eyes_world: Float[np.ndarray, "m 3"], targets_world: Float[np.ndarray, "m 3"]) -> np.ndarray:
@@ -86,6 +94,19 @@ def looking_at(eyes_world: Float[np.ndarray, "m 3"], targets_world: Float[np.nda
 def tilts_of(Ts_world_camera: Float[np.ndarray, "m 4 4"]) -> Float[np.ndarray, "m"]:
     """How far each camera's axis points below the horizontal, radians."""
     return np.arcsin(np.clip(-Ts_world_camera[:, 2, 2], -1.0, 1.0))
+
+
+def lean_of_world(Ts_world_camera: Float[np.ndarray, "n 4 4"]) -> float:
+    """By how much the axis about which cameras are level is off the world's z, radians in [0, pi / 2].
+
+    Cameras that are held level have the x of their images across what is up, whichever way they look. Where they look
+    too few ways to tell, or are not held level, 0: then nothing speaks against z.
+    """
+    across = Ts_world_camera[:, :3, 0]
+    spread, axes = np.linalg.eigh(across.T @ across / max(len(across), 1))
+    if spread[1] < _TURNED or spread[0] > _LEVEL * spread[1]:
+        return 0.0
+    return float(np.arccos(min(abs(axes[2, 0]), 1.0)))
 
 
 def check_room(limits: ViewLimits, boxes: Sequence[Box]) -> None:

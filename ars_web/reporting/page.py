@@ -4,14 +4,13 @@ What comes from data is escaped; there is no script in a report, and nothing in 
 """
 
 import base64
-import os
-import tempfile
 from functools import cache
 from pathlib import Path
 
 from jinja2 import ChoiceLoader, Environment, FileSystemLoader, PackageLoader, StrictUndefined
 
 from ars_web import __version__
+from ars_web.reporting.whole_file import write_whole
 
 
 def report_page(template: str, /, *, templates: Path | None = None, **values: object) -> str:
@@ -27,18 +26,9 @@ def write_page(page: str, file: Path) -> None:
     """Write a page whole or not at all; its folder is made where it is missing.
 
     Raises:
-        OSError: it cannot be written.
+        BadInput: it cannot be written.
     """
-    file.parent.mkdir(parents=True, exist_ok=True)
-    descriptor, partial = tempfile.mkstemp(dir=file.parent, prefix=f".{file.name}.")
-    try:
-        with os.fdopen(descriptor, "w", encoding="utf-8", errors="backslashreplace") as stream:
-            stream.write(page)
-        Path(partial).chmod(0o666 & ~_umask())
-        Path(partial).replace(file)
-    except BaseException:
-        Path(partial).unlink(missing_ok=True)
-        raise
+    write_whole(file, page.encode(errors="backslashreplace"))
 
 
 def data_uri(content: bytes, *, media_type: str) -> str:
@@ -56,9 +46,3 @@ def _environment(templates: Path | None) -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

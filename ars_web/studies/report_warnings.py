@@ -102,7 +102,7 @@ def _whole(report: SessionReport) -> Iterator[ReportWarning]:
     elif not frames.negatives:
         yield _warning(
             "no_negatives",
-            says=f"all {frames.chosen} frames have a label",
+            says=f"all {frames.chosen} frames have a label" if frames.chosen > 1 else "the only frame has a label",
             why="a detector that never saw a scene without objects finds some in everything; up to a tenth of the"
             " frames may show none",
             remedy="film the place without the objects, too, and merge that session",

@@ -18,7 +18,16 @@ from ars_web.geometry.box import Box
 from ars_web.geometry.rigid_transform import Transform
 from ars_web.geometry.sphere_bins import SphereBins
 from ars_web.geometry.view_directions import view_directions
-from ars_web.geometry.view_limits import HALF_SEEN, Range, ViewLimits, check_room, tilts_of
+from ars_web.geometry.view_limits import (
+    HALF_SEEN,
+    LimitName,
+    Range,
+    ViewLimits,
+    check_range,
+    check_room,
+    lean_of_world,
+    tilts_of,
+)
 from ars_web.geometry.view_proposals import (
     REASONS,
     Proposals,
@@ -36,6 +45,9 @@ WIDENED = 0.1
 """Share of what the recording's own distances and heights extend over, that limits taken from it go beyond them."""
 
 WIDENED_TILT = math.radians(5)
+
+LEANS = math.radians(30)
+"""From which lean on the world's z is doubted to be up. Hand-held cameras are level to within less."""
 
 MOST_CELLS = 2_592
 """That views are looked for in: 72 x 36 bins, five degrees wide. Robots do not aim finer."""
@@ -93,6 +105,10 @@ class TourRequest:
             )
         if self.min_visible is not None and not 0.0 <= self.min_visible <= 1.0:
             raise BadInput(f"the share that must be visible is from 0 to 1, not {self.min_visible}")
+        given: dict[LimitName, Range | None] = {"distance": self.distance, "height": self.height, "tilt": self.tilt}
+        for name, limits in given.items():
+            if limits is not None:
+                check_range(name, limits)
 
     @property
     def options(self) -> ExportOptions:
@@ -147,6 +163,7 @@ class Tour:
         turn: radians that the camera turns on the way.
         limits: that were kept to.
         from_recording: the names of those limits that nobody gave.
+        lean: radians between the world's z and the axis about which the frames' cameras are level.
         cells: of all chosen objects together, those that their symmetry leaves.
         empty: how many of them no frame lies in.
     """
@@ -157,6 +174,7 @@ class Tour:
     turn: float
     limits: ViewLimits
     from_recording: tuple[str, ...]
+    lean: float
     cells: int
     empty: int
     left: tuple[CellLeft, ...]
@@ -184,6 +202,12 @@ class Tour:
             text + (" (as the frames)" if name in self.from_recording else "") for name, text in said.items()
         )
         lines = [f"limits: {kept_to}; at least {limits.min_visible:.0%} visible"]
+        if self.lean > LEANS:
+            lines.append(
+                f"the cameras are level about an axis {math.degrees(self.lean):.0f} degrees off the world's z: if that"
+                " is not up, heights and tilts are not what they say; turn the recording's poses so that z is up, and"
+                " import it again"
+            )
         if not self.empty:
             return [*lines, f"nothing is empty: frames lie in all of the {self.cells} cells"]
         lines.append(
@@ -248,6 +272,7 @@ def plan_tour(snapshot: SessionSnapshot, views: SessionViews, rows: Sequence[int
         turn=float((pose_distances(path)[between] - steps).sum() / RADIAN),
         limits=limits,
         from_recording=tuple(name for name in ("distance", "height", "tilt") if getattr(request, name) is None),
+        lean=lean_of_world(frames.Ts_world_camera),
         cells=reached,
         empty=sum(int(one.wanted.sum()) for one in wanted),
         left=tuple(CellLeft(views.box_ids[place], cell, reason) for place, cell, reason in found.left),

@@ -31,16 +31,18 @@ class Hole:
 
     @property
     def words(self) -> str:
-        """Such as "none from azimuth 90 to 180 degrees at 30 to 60 degrees from +z"."""
+        """Such as "none from azimuth 90 to 180 degrees at 30 to 60 degrees from +z"; what goes round 180 says so."""
         low, high = self.polar
         tilt = f"{low:g} to {high:g} degrees from +z"
         if self.all_round and (low, high) == (0.0, 180.0):
             return "none at all"
         if self.all_round:
             return f"none at {tilt}, at any azimuth"
+        start, end = self.azimuth
+        azimuths = f"{start:g} {'to' if start < end else 'over 180 to'} {end:g} degrees"
         if (low, high) == (0.0, 180.0):
-            return f"none from azimuth {self.azimuth[0]:g} to {self.azimuth[1]:g} degrees, at any height"
-        return f"none from azimuth {self.azimuth[0]:g} to {self.azimuth[1]:g} degrees at {tilt}"
+            return f"none from azimuth {azimuths}, at any height"
+        return f"none from azimuth {azimuths} at {tilt}"
 
 
 def holes_of(coverage: Coverage) -> tuple[Hole, ...]:

@@ -96,6 +96,7 @@ def test_the_picture_is_a_png(client: httpx.Client, ring: str, ball: int) -> Non
         ("?min_visible=nan", 422, "min_visible"),
         ("?shape=mesh", 422, "needs a mesh"),
         ("?shape=ball", 422, "shape"),
+        ("?min_visble=0.5", 422, "query.min_visble: unknown field"),
         ("/frames", 422, "a bin of equal angles, or a cell"),
         ("/frames?azimuth=3", 422, "a bin of equal angles, or a cell"),
         ("/frames?azimuth=3&polar=2&cell=1", 422, "a bin of equal angles, or a cell"),

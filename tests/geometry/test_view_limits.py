@@ -8,7 +8,8 @@ import pytest
 from ars_web.errors import BadInput
 from ars_web.geometry.box import Box
 from ars_web.geometry.rigid_transform import checked
-from ars_web.geometry.view_limits import ViewLimits, check_room, looking_at, tilts_of
+from ars_web.geometry.symmetry import turn_about
+from ars_web.geometry.view_limits import ViewLimits, check_room, lean_of_world, looking_at, tilts_of
 
 
 def cube_at(z: float) -> Box:
@@ -50,7 +51,7 @@ def test_straight_down_and_up_the_image_s_x_is_the_world_s() -> None:
     [
         ({"distance": (0.6, 0.3)}, "the limits of distance are the wrong way round: 0.6 is more than 0.3"),
         ({"height": (0.6, 0.3)}, "the limits of height are the wrong way round"),
-        ({"tilt": (0.6, 0.3)}, "the limits of tilt are the wrong way round"),
+        ({"tilt": (0.6, 0.3)}, "the limits of tilt are the wrong way round: 34.3775 is more than 17.1887 degrees"),
         ({"distance": (math.nan, 0.3)}, "the limits of distance must be finite numbers of metres, not nan and 0.3"),
         ({"height": (0.0, math.inf)}, "the limits of height must be finite numbers of metres"),
         ({"distance": (0.3, 1e300)}, "the limits of distance must be within 1e\\+07 metres"),
@@ -76,3 +77,33 @@ def test_limits_that_leave_no_room_are_named() -> None:
         BadInput, match=r"tilts of 0 to 5\.73 degrees at distances of 0\.3 to 0\.6 m put the camera 0\.1"
     ):
         check_room(limits(height=(0.5, 3.0), tilt=(0.0, 0.1)), [cube_at(0.1)])
+
+
+def ring_of(degrees: float) -> np.ndarray:
+    """Level cameras round the origin, through so many degrees, looking down at it a little."""
+    angles = np.radians(np.linspace(0.0, degrees, 40, endpoint=False))
+    eyes = np.stack([np.cos(angles), np.sin(angles), np.full(40, 0.6)], axis=-1)
+    return looking_at(eyes, np.zeros((40, 3)))
+
+
+def turned(Ts: np.ndarray, axis: tuple[float, float, float], angle: float) -> np.ndarray:
+    T = np.eye(4)
+    T[:3, :3] = turn_about(np.array(axis), angle)
+    return T @ Ts
+
+
+@pytest.mark.parametrize("degrees", [90.0, 360.0])
+@pytest.mark.parametrize("angle", [0.0, 0.3, math.pi / 2])
+def test_a_world_whose_z_is_not_up_shows_in_level_cameras(degrees: float, angle: float) -> None:
+    assert lean_of_world(turned(ring_of(degrees), (1.0, 0.0, 0.0), angle)) == pytest.approx(angle, abs=1e-6)
+
+
+def test_cameras_that_say_nothing_of_what_is_up_speak_against_no_z() -> None:
+    on_side = turned(ring_of(360.0), (1.0, 0.0, 0.0), math.pi / 2)
+    assert lean_of_world(on_side[:1]) == 0.0, "one frame"
+    assert lean_of_world(turned(ring_of(10.0), (1.0, 0.0, 0.0), math.pi / 2)) == 0.0, "nearly one way"
+    rolled = ring_of(360.0)
+    rolled[:, :3, :2] = np.stack([rolled[:, :3, 1], -rolled[:, :3, 0]], axis=-1)
+    assert lean_of_world(rolled) == 0.0, "images a quarter turn about their axes"
+    down = looking_at(np.random.default_rng(0).normal(size=(20, 3)) * [1, 1, 0] + [0, 0, 3], np.zeros((20, 3)))
+    assert lean_of_world(down) == pytest.approx(0.0, abs=1e-6), "from above"

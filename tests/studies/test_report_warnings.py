@@ -178,6 +178,7 @@ def test_nothing_is_said_of_a_session_at_all_limits() -> None:
     ("change", "kind", "says", "remedy"),
     [
         (frames(negatives=0), "no_negatives", "all 1000 frames have a label", "--merge SESSION"),
+        (frames(chosen=1, negatives=0), "no_negatives", "the only frame has a label", "--merge SESSION"),
         (frames(negatives=501), "many_negatives", "501 of 1000 frames (50 %) have no label", "--frames-start"),
         (of_class(labels=49), "few_labels", "class 'pan' has 49 labels", "ars-web tour s1 --class pan"),
         (of_class(labels=49, objects=2), "rare_class", "'cup' has 500: 10 times as many", "ars-web tour s1"),

@@ -198,7 +198,7 @@ def test_the_same_question_has_the_same_answer() -> None:
         ({"bins": SphereBins(100, 100)}, "at most 2592 cells, 72 x 36 bins, not in 100 x 100"),
         ({"distance": (0.9, 0.3)}, "limits of distance are the wrong way round: 0.9 is more than 0.3"),
         ({"distance": (-1.0, 0.3)}, "a distance must be more than 0 m, not -1 to 0.3"),
-        ({"tilt": (0.0, math.inf)}, "limits of tilt must be finite numbers of radians"),
+        ({"tilt": (0.0, math.inf)}, "limits of tilt must be finite numbers of degrees, not 0 and inf"),
         ({"height": (3.0, 4.0)}, "no camera is 3 to 4 m high and within"),
         ({"tilt": (-1.5, -1.2), "distance": (0.5, 0.6)}, "tilts of -85.9 to -68.8 degrees at distances of 0.5 to 0.6"),
         (

@@ -33,7 +33,7 @@ def everywhere_but(azimuths: range, polars: range) -> list[tuple[int, int]]:
     ("azimuths", "polars", "words"),
     [
         (range(9, 12), range(1, 2), "none from azimuth 90 to 180 degrees at 30 to 60 degrees from +z"),
-        (range(11, 14), range(1, 3), "none from azimuth 150 to -120 degrees at 30 to 90 degrees from +z"),
+        (range(11, 14), range(1, 3), "none from azimuth 150 over 180 to -120 degrees at 30 to 90 degrees from +z"),
         (range(12), range(3, 6), "none at 90 to 180 degrees from +z, at any azimuth"),
         (range(2, 8), range(6), "none from azimuth -120 to 60 degrees, at any height"),
         (range(12), range(6), "none at all"),
