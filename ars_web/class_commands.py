@@ -46,6 +46,33 @@ def list_classes(session: take.Session, sessions: take.Sessions = take.SESSIONS,
     print_table(("id", "name", "color", "size, mm", "symmetry", "keypoints", "mesh"), rows)
 
 
+@app.command("add")
+def add_class(
+    session: take.Session,
+    name: Annotated[str, typer.Argument(metavar="NAME", help="The new class's name; no other has it.")],
+    size: Annotated[str | None, typer.Option("--size", metavar="X,Y,Z", help="Metres, of new boxes.")] = None,
+    color: Annotated[
+        str | None, typer.Option("--color", metavar="#RRGGBB", help="In pictures and the page; default: a new one.")
+    ] = None,
+    sessions: take.Sessions = take.SESSIONS,
+    as_json: take.Json = False,
+) -> None:
+    """Add a class, which boxes and labels can then be of."""
+    from ars_web.sessions.boxes_json import class_json
+    from ars_web.sessions.editing import SessionEditor
+    from ars_web.sessions.store import SessionStore
+
+    with SessionStore(sessions) as store:
+        sid = store.find(session)
+        default_size = None if size is None else _three(size, "--size")
+        added = SessionEditor(store).add_class(sid, name=name, color=color, default_size=default_size, author=AUTHOR)
+        meshes = store.meshes(sid)
+    if as_json:
+        print_json(class_json(added, meshes))
+    else:
+        print(f"{added.name}: class {added.id}")
+
+
 @app.command("set")
 def set_class(
     session: take.Session,

@@ -60,6 +60,24 @@ def state_in(sessions: Path) -> SessionState:
         return store.state(store.find("desk"))
 
 
+def test_a_class_is_added_with_a_colour_of_its_own(command: Command, sessions: Path) -> None:
+    out, _ = command("classes", "add", "mug", "--size", "0.08,0.08,0.1")
+    assert out == "mug: class 2\n"
+    out, _ = command("classes", "add", "cup", "--color", "#102030", "--json")
+    assert (json.loads(out)["id"], json.loads(out)["color"]) == (3, "#102030")
+    classes = state_in(sessions).classes
+    assert classes[2].default_size == (0.08, 0.08, 0.1)
+    assert len({one.color for one in classes.values()}) == 4
+    for bad, says in (
+        (["mug"], "mug"),
+        (["pot", "--size", "1,2"], "--size"),
+        (["pot", "--color", "red"], "red"),
+    ):
+        _, err = command("classes", "add", *bad, status=1)
+        assert says in err
+    assert list(state_in(sessions).classes) == [0, 1, 2, 3]
+
+
 def test_what_is_set_of_a_class_is_listed(command: Command, sessions: Path) -> None:
     out, err = command(
         "classes", "set", "brick", "--symmetry", "z4,x2", "--keypoint", "tip=0,0,0.5", "--keypoint", "a=b=-0.5,0,1e-1",
