@@ -57,8 +57,13 @@ def test_tours_are_shorter_than_the_nearest_neighbour_s(n: int) -> None:
         assert path_length(distances, path) < path_length(distances, nearest_neighbour_path(distances))
 
 
-def test_no_stretch_turned_round_and_none_of_three_moved_shortens_a_tour() -> None:
-    distances = pose_distances(random_poses(24, 3))
+@pytest.mark.parametrize("seed", range(3))
+def test_no_stretch_turned_round_and_none_of_three_moved_shortens_a_tour(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # The best of many first poses may be as good by chance.
+    monkeypatch.setattr(view_tour, "STARTS", 1)
+    distances = pose_distances(random_poses(24, seed))
     path = short_path(distances).tolist()
     shortest_of_all = path_length(distances, np.array(path)) - 1e-9
     for i in range(1, 24):
