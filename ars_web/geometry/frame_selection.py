@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ars_web.geometry import selection_kernels
+from ars_web.geometry.even_spacing import evenly
 
 NOTHING = -1
 """The element of an object that has no label in a frame."""
@@ -71,12 +72,6 @@ class Nearness:
 
 
 NO_TWINS = Nearness()
-
-
-def evenly(n: int, count: int) -> Int[np.ndarray, "k"]:
-    """`count` of n places, or all: the middles of as many stretches of equal length."""
-    count = min(n, count)
-    return (2 * np.arange(count) + 1) * n // max(1, 2 * count)
 
 
 def apart(views: FrameViews, near: Nearness) -> Int[np.ndarray, "k"]:

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ars_web.geometry.even_spacing import evenly
 from ars_web.geometry.frame_selection import (
     NO_TWINS,
     NOTHING,
@@ -16,7 +17,6 @@ from ars_web.geometry.frame_selection import (
     apart,
     covered,
     covering,
-    evenly,
     greedily,
     spread_order,
     tie_order,
@@ -208,12 +208,6 @@ def test_twins_show_nothing_more_from_about_the_same_place() -> None:
     assert twins_of(views, np.array([0]), Nearness(3.0)).tolist() == [False, True, False, False, False, True]
     two = FrameViews(elements, views.directions, distances, np.array([0, 1, 0, 0, 0, 1]), np.arange(6))
     assert twins_of(two, np.array([0]), Nearness(3.0, 9)).tolist() == [False, False, True, True, True, False]
-
-
-def test_even_spacing_takes_the_middles_of_equal_stretches() -> None:
-    assert evenly(10, 5).tolist() == [1, 3, 5, 7, 9]
-    assert evenly(3, 9).tolist() == [0, 1, 2]
-    assert evenly(0, 4).tolist() == []
 
 
 def test_sessions_without_objects_or_frames_have_nothing_to_cover() -> None:
