@@ -19,12 +19,12 @@ from ars_web.datasets.coverage import session_views
 from ars_web.datasets.frame_choosing import choose_frames, directions_in_frames
 from ars_web.datasets.options import ExportOptions
 from ars_web.geometry import selection_kernels
+from ars_web.geometry.even_spacing import evenly
 from ars_web.geometry.frame_selection import (
     NOTHING,
     FrameViews,
     Nearness,
     covering,
-    evenly,
     greedily,
     tie_order,
     worth,

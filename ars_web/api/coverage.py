@@ -11,6 +11,7 @@ from ars_web.api.problems import documented
 from ars_web.datasets.coverage import SessionViews, called, chosen_boxes, coverage_of, frames_in_bin
 from ars_web.datasets.options import ExportOptions
 from ars_web.errors import BadInput
+from ars_web.geometry.even_spacing import evenly
 from ars_web.geometry.sphere_bins import MOST_BINS, SphereBins
 from ars_web.sessions.model import SessionSnapshot
 from ars_web.studies.coverage_json import CoverageJson, coverage_json
@@ -137,9 +138,8 @@ def frames(
     angle = None if azimuth is None or polar is None else azimuth * bins.polar + polar
     _, views, rows = _views(services, sid, meant, by)
     found = frames_in_bin(views, bins, rows, angle=angle, cell=cell)
-    count = min(limit, len(found))
-    spread = [found[(2 * i + 1) * len(found) // (2 * count)] for i in range(count)]
-    items = [{"frame": frame, "box_id": views.box_ids[row]} for frame, row in spread]
+    shown = (found[place] for place in evenly(len(found), limit).tolist())
+    items = [{"frame": frame, "box_id": views.box_ids[row]} for frame, row in shown]
     return JsonResponse({"total": len(found), "items": items})
 
 

@@ -101,8 +101,14 @@ def session_views(
         with_visible=options.min_visible > 0,
     )
     keep, _ = kept(table, options)
-    centres = np.ascontiguousarray(frames.Ts_world_camera[rows, :3, 3])
-    symmetries = tuple(state.classes[box.class_id].symmetry for box in boxes)
+    return views_where(snapshot, rows, keep)
+
+
+def views_where(snapshot: SessionSnapshot, rows: Int[np.ndarray, "n"], keep: Bool[np.ndarray, "n b"]) -> SessionViews:
+    """How the frames `rows` see the session's boxes where these, by ascending id, are labelled: `keep`."""
+    boxes = [box for _, box in sorted(snapshot.state.boxes.items())]
+    centres = np.ascontiguousarray(snapshot.frames.Ts_world_camera[rows, :3, 3])
+    symmetries = tuple(snapshot.state.classes[box.class_id].symmetry for box in boxes)
     directions = np.empty((len(boxes), len(rows), 3))
     for row, (box, symmetry) in enumerate(zip(boxes, symmetries, strict=True)):
         directions[row] = view_directions(centres, box.box, symmetry=symmetry)

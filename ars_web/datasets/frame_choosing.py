@@ -16,7 +16,8 @@ from ars_web.datasets.options import ExportOptions, FrameChoice, SplitChoice
 from ars_web.datasets.planned import ChoiceMade
 from ars_web.errors import BadInput, NotFound
 from ars_web.geometry.camera import rectified
-from ars_web.geometry.frame_selection import NOTHING, FrameViews, Nearness, apart, covered, covering, evenly, twins_of
+from ars_web.geometry.even_spacing import evenly
+from ars_web.geometry.frame_selection import NOTHING, FrameViews, Nearness, apart, covered, covering, twins_of
 from ars_web.geometry.sphere_bins import NOWHERE, SphereBins
 from ars_web.geometry.view_sector import azimuths_round, in_sector
 from ars_web.sessions.model import SessionSnapshot

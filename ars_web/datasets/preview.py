@@ -14,6 +14,7 @@ from ars_web.datasets.options import ExportOptions
 from ars_web.datasets.samples import FrameLabel, frame_labels, labels_in_frames
 from ars_web.datasets.shapes import check_shape, meshes_of
 from ars_web.errors import BadInput, NotFound, StoreError
+from ars_web.geometry.even_spacing import evenly
 from ars_web.recordings.images import read_image
 from ars_web.recordings.stored_images import local
 from ars_web.sessions.model import SessionSnapshot
@@ -83,8 +84,7 @@ def labelled_frames(snapshot: SessionSnapshot) -> list[int]:
 
 def spread(indices: Sequence[int], count: int) -> list[int]:
     """`count` of the indices, or all where there are fewer, each from the middle of an equal share of them."""
-    count = min(count, len(indices))
-    return [indices[(2 * i + 1) * len(indices) // (2 * count)] for i in range(count)]
+    return [indices[place] for place in evenly(len(indices), count).tolist()]
 
 
 def draw_frame(

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ars_web.geometry import selection_kernels
+from ars_web.geometry.even_spacing import evenly
 
 NOTHING = -1
 """The element of an object that has no label in a frame."""
@@ -71,12 +72,6 @@ class Nearness:
 
 
 NO_TWINS = Nearness()
-
-
-def evenly(n: int, count: int) -> Int[np.ndarray, "k"]:
-    """`count` of n places, or all: the middles of as many stretches of equal length."""
-    count = min(n, count)
-    return (2 * np.arange(count) + 1) * n // max(1, 2 * count)
 
 
 def apart(views: FrameViews, near: Nearness) -> Int[np.ndarray, "k"]:
@@ -169,17 +164,28 @@ def _columns(views: FrameViews) -> selection_kernels.Views:
 
 def _twins(views: selection_kernels.Views, near: Nearness) -> selection_kernels.Twins:
     angle = np.radians(near.degrees)
+    by_time = np.lexsort((views.frame, views.recording))
+    place = np.empty_like(by_time)
+    place[by_time] = np.arange(len(by_time))
     labelled = views.elements != NOTHING
     rows = np.flatnonzero(labelled.any(axis=1)) if near.degrees > 0.0 else np.zeros(0, dtype=np.int64)
     first = labelled[rows].argmax(axis=1) if len(rows) else rows
-    z = views.directions[rows, first, 2]
-    order = np.lexsort((z, first))
+    directions = views.directions[rows, first]
+    # Of a camera that goes round at one height z tells nothing apart, and every frame would be held against every one.
+    axis = np.zeros(labelled.shape[1], dtype=np.int64)
+    for k in np.unique(first).tolist():
+        axis[k] = directions[first == k].var(axis=0).argmax()
+    along = directions[np.arange(len(rows)), axis[first]]
+    order = np.lexsort((along, first))
     return selection_kernels.Twins(
-        frames=near.frames or -1,
+        frames=near.frames,
+        by_time=by_time,
+        place=place,
         cosine=float(np.cos(angle)) - _ROUNDING,
         share=NEAR_SHARE,
         reach=float(2.0 * np.sin(angle / 2.0)) + 1e-6,
+        axis=axis,
         rows=rows[order],
-        z=z[order],
+        along=along[order],
         starts=np.searchsorted(first[order], np.arange(labelled.shape[1] + 1)),
     )

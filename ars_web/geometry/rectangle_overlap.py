@@ -9,12 +9,23 @@ def pairwise_iou(first: Float[np.ndarray, "n 4"], second: Float[np.ndarray, "m 4
 
     It is 0 where both are empty.
     """
-    corners = np.maximum(first[:, None, :2], second[None, :, :2])
-    ends = np.minimum(first[:, None, 2:], second[None, :, 2:])
-    common = np.clip(ends - corners, 0.0, None).prod(axis=-1)
-    union = _areas(first)[:, None] + _areas(second)[None, :] - common
-    return np.divide(common, union, out=np.zeros_like(common), where=union > 0)
+    return _iou(first[:, None], second[None])
 
 
-def _areas(rectangles: Float[np.ndarray, "n 4"]) -> Float[np.ndarray, "n"]:
-    return np.clip(rectangles[:, 2:] - rectangles[:, :2], 0.0, None).prod(axis=-1)
+def row_iou(first: Float[np.ndarray, "n 4"], second: Float[np.ndarray, "n 4"]) -> Float[np.ndarray, "n"]:
+    """Intersection over union of each rectangle of one list with that of its row in another.
+
+    It is 0 where both are empty, NaN where either is.
+    """
+    return _iou(first, second)
+
+
+def _iou(first: Float[np.ndarray, "*n 4"], second: Float[np.ndarray, "*m 4"]) -> Float[np.ndarray, "*k"]:
+    sides = np.minimum(first[..., 2:], second[..., 2:]) - np.maximum(first[..., :2], second[..., :2])
+    common = np.clip(sides, 0.0, None).prod(axis=-1)
+    union = _areas(first) + _areas(second) - common
+    return np.divide(common, union, out=np.zeros_like(common), where=union != 0)
+
+
+def _areas(rectangles: Float[np.ndarray, "*n 4"]) -> Float[np.ndarray, "*n"]:
+    return np.clip(rectangles[..., 2:] - rectangles[..., :2], 0.0, None).prod(axis=-1)

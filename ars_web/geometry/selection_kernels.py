@@ -31,21 +31,27 @@ class Twins(NamedTuple):
     """Which frames are near twins.
 
     Attributes:
-        frames: apart in time at most; -1: none are twins by time.
+        frames: apart in time at most; 0: none are twins by time.
+        by_time: (n,) all frames by their recording and the place in it.
+        place: (n,) where each frame is in `by_time`.
         cosine, share: of the largest angle between two views, and by how much distances differ.
-        reach: by how much z of two directions can differ within that angle.
-        rows: frames with a label, by the first object that they have one of, and then by z of its direction; none
+        reach: by how much a coordinate of two directions can differ within that angle.
+        axis: (b,) by which coordinate of their directions each object's rows are sorted.
+        rows: (m,) frames with a label, by the first object that they have one of, and then by that coordinate; none
             where there are no twins by view.
-        z: those.
-        starts: where each object's rows begin, and after the last their number.
+        along: (m,) those coordinates.
+        starts: (b + 1,) where each object's rows begin, and after the last their number.
     """
 
     frames: int
+    by_time: Array
+    place: Array
     cosine: float
     share: float
     reach: float
+    axis: Array
     rows: Array
-    z: Array
+    along: Array
     starts: Array
 
 
@@ -83,35 +89,31 @@ def shows_no_more(i: int, j: int, views: Views, twins: Twins) -> bool:
 
 
 @part
-def mark_twins(i: int, after: int, views: Views, twins: Twins, state: Array) -> None:
-    """Mark the free frames from `after` on that are near twins of frame i."""
+def mark_twins(i: int, views: Views, twins: Twins, state: Array) -> None:
+    """Mark the free frames that are near twins of frame i."""
     recording = views.recording[i]
-    if twins.frames >= 0:
-        for j in range(after, len(state)):
-            if (
-                state[j] == FREE
-                and views.recording[j] == recording
-                and abs(views.frame[j] - views.frame[i]) <= twins.frames
-            ):
+    for step in (-1, 1):
+        at = twins.place[i] + step
+        while 0 <= at < len(twins.by_time):
+            j = twins.by_time[at]
+            if views.recording[j] != recording or abs(views.frame[j] - views.frame[i]) > twins.frames:
+                break
+            if state[j] == FREE:
                 state[j] = TWIN
+            at += step
     if len(twins.rows) == 0:
         return
     for k in range(views.elements.shape[1]):
         if views.elements[i, k] < 0:
             continue
-        z = views.directions[i, k, 2]
+        along = views.directions[i, k, twins.axis[k]]
         start, stop = twins.starts[k], twins.starts[k + 1]
-        first = start + np.searchsorted(twins.z[start:stop], z - twins.reach)
+        first = start + np.searchsorted(twins.along[start:stop], along - twins.reach)
         for place in range(first, stop):
-            if twins.z[place] > z + twins.reach:
+            if twins.along[place] > along + twins.reach:
                 break
             j = twins.rows[place]
-            if (
-                j >= after
-                and state[j] == FREE
-                and views.recording[j] == recording
-                and shows_no_more(i, j, views, twins)
-            ):
+            if state[j] == FREE and views.recording[j] == recording and shows_no_more(i, j, views, twins):
                 state[j] = TWIN
 
 
@@ -170,7 +172,7 @@ def choose_lazily(views: Views, twins: Twins, counts: Array, chosen: Array) -> i
         for j in range(views.elements.shape[1]):
             if views.elements[i, j] >= 0:
                 counts[views.elements[i, j]] += 1
-        mark_twins(i, 0, views, twins, state)
+        mark_twins(i, views, twins, state)
     return found
 
 
@@ -180,11 +182,11 @@ def walk(views: Views, twins: Twins, state: Array) -> None:
     for i in range(len(state)):
         if state[i] == FREE:
             state[i] = CHOSEN
-            mark_twins(i, i + 1, views, twins, state)
+            mark_twins(i, views, twins, state)
 
 
 @entry
 def mark_all(rows: Array, views: Views, twins: Twins, state: Array) -> None:
     """Mark in `state` (n,) the free frames that are near twins of those at `rows`."""
     for i in rows:
-        mark_twins(i, 0, views, twins, state)
+        mark_twins(i, views, twins, state)

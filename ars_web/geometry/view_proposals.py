@@ -37,6 +37,12 @@ SMALLEST = 0.05
 OTHERS = 1e-3
 """How much it counts to see cells again that are thinly seen, beside filling the one that is furthest from any seen."""
 
+LOOKED_AT_ONCE = 200_000
+"""Poses times objects that are looked at together, so that memory does not grow with the product of both."""
+
+_DIGITS = 9
+"""Of what a pose adds. Poses that add as much, which is common round a cube, are chosen alike on every machine."""
+
 _UNTRIED, _FOUND = -1, len(REASONS)
 
 
@@ -174,23 +180,33 @@ class _Poses:
         """All poses that fill something."""
         b = len(self._obstacles)
         parts = [
-            (np.zeros((0, 4, 4)), np.zeros(0, int), np.zeros((0, b), bool), np.zeros((0, len(self._objects)), int))
+            (np.zeros((0, 4, 4)), np.zeros(0, int), np.zeros((0, b), bool), np.zeros((0, len(self._objects)), np.int32))
         ]
+        step = max(1, LOOKED_AT_ONCE // max(1, b))
         for eyes, rows, cells in self._rounds():
-            targets = np.array([wanted.box.T_world_box[:3, 3] for wanted in self._objects])[rows]
-            Ts = looking_at(eyes, targets)
-            stages = self._stage_in_space(Ts)
-            free = np.flatnonzero(stages == _FOUND)
-            shown = self._look(Ts[free])
-            clear = self._seen_well(shown)
-            at = np.array([wanted.place for wanted in self._objects])
-            stages[free] = self._stage_in_image(shown, at[rows[free]], np.arange(len(free)), clear)
-            seen = self._cells_seen(Ts[free], clear[:, at])
-            self._note(rows, cells, stages, seen)
-            useful = self._fills(seen).any(axis=1)
-            parts.append((Ts[free][useful], rows[free][useful], shown.labelled[useful], seen[useful]))
+            for first in range(0, len(eyes), step):
+                some = slice(first, first + step)
+                parts.append(self._useful(eyes[some], rows[some], cells[some]))
         Ts, rows, labelled, seen = (np.concatenate(column) for column in zip(*parts, strict=True))
         return _Tried(Ts, rows, labelled, seen, self._stages)
+
+    def _useful(
+        self, eyes: Float[np.ndarray, "m 3"], rows: Int[np.ndarray, "m"], cells: Int[np.ndarray, "m"]
+    ) -> tuple[Float[np.ndarray, "u 4 4"], Int[np.ndarray, " u"], Bool[np.ndarray, "u b"], Int[np.ndarray, "u c"]]:
+        """Of the poses at these eyes, each for the object of its row and one of its cells, those that fill something:
+        the columns of `_Tried`. How far all of them got is noted."""
+        targets = np.array([wanted.box.T_world_box[:3, 3] for wanted in self._objects])[rows]
+        Ts = looking_at(eyes, targets)
+        stages = self._stage_in_space(Ts)
+        free = np.flatnonzero(stages == _FOUND)
+        shown = self._look(Ts[free])
+        clear = self._seen_well(shown)
+        at = np.array([wanted.place for wanted in self._objects])
+        stages[free] = self._stage_in_image(shown, at[rows[free]], np.arange(len(free)), clear)
+        seen = self._cells_seen(Ts[free], clear[:, at])
+        self._note(rows, cells, stages, seen)
+        useful = self._fills(seen).any(axis=1)
+        return Ts[free][useful], rows[free][useful], shown.labelled[useful], seen[useful]
 
     def _rounds(
         self,
@@ -262,7 +278,7 @@ class _Poses:
     def _cells_seen(self, Ts: Float[np.ndarray, "m 4 4"], clear: Bool[np.ndarray, "m c"]) -> Int[np.ndarray, "m c"]:
         """The cell from which each wanted object is seen well; -1 where it is not."""
         centres = np.ascontiguousarray(Ts[:, :3, 3])
-        cells = np.full(clear.shape, -1)
+        cells = np.full(clear.shape, -1, dtype=np.int32)
         for row, wanted in enumerate(self._objects):
             _, found = self._bins.of(view_directions(centres, wanted.box, symmetry=wanted.symmetry))
             cells[:, row] = np.where(clear[:, row], found, -1)
@@ -303,7 +319,7 @@ def _chosen(tried: _Tried, objects: Sequence[WantedObject], bins: SphereBins, co
         aside = np.where(fills, gaps[columns, seen] / np.pi, 0.0).sum(axis=1)
         others = np.where(there & ~fills, 1.0 / (1.0 + counts[columns, seen]), 0.0).sum(axis=1)
         # Both together are less than one cell, however many objects are seen.
-        gains = fills.sum(axis=1) + (aside + OTHERS * others) / (1 + len(objects))
+        gains = np.round(fills.sum(axis=1) + (aside + OTHERS * others) / (1 + len(objects)), _DIGITS)
         gains[~fills.any(axis=1)] = 0.0
         best = int(np.argmax(gains))
         if gains[best] <= 0.0:

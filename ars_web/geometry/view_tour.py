@@ -24,7 +24,16 @@ LONGEST_MOVED = 3
 """Poses of a stretch that Or-opt moves."""
 
 _LESS = 1e-12
-"""Metres. What shortens a path by less is rounding."""
+"""Of the largest distance between two places. What shortens a path by less is rounding, which would have no end."""
+
+_DIGITS = 9
+"""Of distances in metres. Poses that are as far as others are so on every machine."""
+
+
+def camera_turns(Ts: Float[np.ndarray, "n 4 4"]) -> Float[np.ndarray, "k"]:
+    """By how much a camera turns from each pose to the next, radians; one fewer than there are poses."""
+    along = (Ts[:-1, :3, :3] * Ts[1:, :3, :3]).sum(axis=(1, 2))
+    return np.arccos(np.clip((along - 1.0) / 2.0, -1.0, 1.0))
 
 
 def pose_distances(Ts: Float[np.ndarray, "n 4 4"]) -> Float[np.ndarray, "n n"]:
@@ -42,7 +51,7 @@ def tour(start: Transform, Ts: Float[np.ndarray, "n 4 4"]) -> Int[np.ndarray, "n
     """The order of the poses on a short path from `start`, which is none of them."""
     if not len(Ts):
         return np.zeros(0, dtype=np.int64)
-    return short_path(pose_distances(np.concatenate([start[None], Ts])))[1:] - 1
+    return short_path(np.round(pose_distances(np.concatenate([start[None], Ts])), _DIGITS))[1:] - 1
 
 
 def path_length(distances: Float[np.ndarray, "n n"], path: Int[np.ndarray, "n"]) -> float:
@@ -52,13 +61,14 @@ def path_length(distances: Float[np.ndarray, "n n"], path: Int[np.ndarray, "n"])
 
 def short_path(distances: Float[np.ndarray, "n n"]) -> Int[np.ndarray, "n"]:
     """A short path from place 0 through all others, never longer than the nearest neighbour's."""
+    less = _LESS * float(distances.max(initial=0.0))
     nearest = np.argsort(distances[0, 1:], kind="stable") + 1
     best, length = np.zeros(1, dtype=np.int64), np.inf
     starts = int(np.clip(STARTED // max(len(nearest), 1), 1, STARTS))
     for first in nearest[:starts].tolist():
-        path = _shortened(distances, nearest_neighbour_path(distances, first=first))
+        path = _shortened(distances, nearest_neighbour_path(distances, first=first), less=less)
         found = path_length(distances, path)
-        if found < length - _LESS:
+        if found < length - less:
             best, length = path, found
     return best
 
@@ -74,36 +84,38 @@ def nearest_neighbour_path(distances: Float[np.ndarray, "n n"], *, first: int | 
     return np.array(path)
 
 
-def _shortened(distances: Float[np.ndarray, "n n"], path: Int[np.ndarray, "n"]) -> Int[np.ndarray, "n"]:
-    """The path with stretches turned round and moved until that makes it no shorter."""
+def _shortened(distances: Float[np.ndarray, "n n"], path: Int[np.ndarray, "n"], *, less: float) -> Int[np.ndarray, "n"]:
+    """The path with stretches turned round and moved until that makes it shorter by no more than `less`."""
     n, improved = len(path), True
     while improved:
         improved = False
         for i in range(1, n):
-            turned = _turned(distances, path, i)
+            turned = _turned(distances, path, i, less=less)
             if turned is not None:
                 path, improved = turned, True
             for length in range(1, min(LONGEST_MOVED, n - i) + 1):
-                moved = _moved(distances, path, i, length)
+                moved = _moved(distances, path, i, length, less=less)
                 if moved is not None:
                     path, improved = moved, True
     return path
 
 
-def _turned(distances: Float[np.ndarray, "n n"], path: Int[np.ndarray, "n"], i: int) -> Int[np.ndarray, "n"] | None:
-    """The path with its best stretch from i on turned round; None where that shortens nothing."""
+def _turned(
+    distances: Float[np.ndarray, "n n"], path: Int[np.ndarray, "n"], i: int, *, less: float
+) -> Int[np.ndarray, "n"] | None:
+    """The path with its best stretch from i on turned round; None where that shortens it by no more than `less`."""
     before, first, lasts = path[i - 1], path[i], path[i:]
     gained = distances[before, first] - distances[before, lasts]
     # The path is open: nothing follows its last place.
     gained[:-1] += distances[lasts[:-1], lasts[1:]] - distances[first, lasts[1:]]
     best = int(np.argmax(gained))
-    if gained[best] <= _LESS:
+    if gained[best] <= less:
         return None
     return np.concatenate([path[:i], path[i : i + best + 1][::-1], path[i + best + 1 :]])
 
 
 def _moved(
-    distances: Float[np.ndarray, "n n"], path: Int[np.ndarray, "n"], i: int, length: int
+    distances: Float[np.ndarray, "n n"], path: Int[np.ndarray, "n"], i: int, length: int, *, less: float
 ) -> Int[np.ndarray, "n"] | None:
     """The path with the stretch of `length` places from i on put where it is best, either way round; None where it is
     best as it is."""
@@ -116,6 +128,6 @@ def _moved(
     costs = np.stack([distances[rest, first], distances[rest, last]])
     costs[:, :-1] += np.stack([distances[last, rest[1:]], distances[first, rest[1:]]]) - distances[rest[:-1], rest[1:]]
     way, place = np.unravel_index(int(np.argmin(costs)), costs.shape)
-    if saved - costs[way, place] <= _LESS:
+    if saved - costs[way, place] <= less:
         return None
     return np.concatenate([rest[: place + 1], stretch[::-1] if way else stretch, rest[place + 1 :]])

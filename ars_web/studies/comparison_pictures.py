@@ -2,13 +2,13 @@
 
 from itertools import pairwise
 
-import cv2
 import numpy as np
 
 from ars_web.datasets.drawing import Canvas, Color, color_of
 from ars_web.errors import BadFile
 from ars_web.recordings.images import read_image
 from ars_web.recordings.stored_images import local
+from ars_web.reporting.jpeg import jpeg
 from ars_web.sessions.model import SessionSnapshot
 from ars_web.studies.compared_frames import ComparedLabel, WorstFrame
 
@@ -19,8 +19,9 @@ LONELY = "#ff4d6d"
 GOOD = 0.75
 """Pairs that overlap more are drawn without a word."""
 
-_WIDEST = 1280
-_QUALITY = [cv2.IMWRITE_JPEG_QUALITY, 82]
+_LONGEST = 1280
+"""Pixels of a picture's longer side."""
+
 _DASHES = 14
 """Along each side of what is seen of an object."""
 
@@ -43,14 +44,7 @@ def picture(snapshot: SessionSnapshot, worst: WorstFrame) -> bytes:
         word = _word(label)
         if word and label.counts:
             canvas.tag(label.bbox, label.class_name, word, _color(label))
-    pixels = canvas.pixels
-    if pixels.shape[1] > _WIDEST:
-        pixels = cv2.resize(
-            pixels, (_WIDEST, round(pixels.shape[0] * _WIDEST / pixels.shape[1])), None, 0, 0, cv2.INTER_AREA
-        )
-    ok, content = cv2.imencode(".jpg", pixels, _QUALITY)
-    assert ok, "OpenCV cannot encode JPEG"
-    return content.tobytes()
+    return jpeg(canvas.pixels, longest=_LONGEST)
 
 
 def picture_or_reason(snapshot: SessionSnapshot, worst: WorstFrame) -> bytes | str:
@@ -58,7 +52,8 @@ def picture_or_reason(snapshot: SessionSnapshot, worst: WorstFrame) -> bytes | s
     try:
         return picture(snapshot, worst)
     except BadFile as error:
-        return str(error)
+        # Reports are passed on: where the recording lies is nobody's business.
+        return str(error).replace(str(snapshot.frames.images[worst.frame.index]), worst.frame.name)
 
 
 def _color(label: ComparedLabel) -> Color:

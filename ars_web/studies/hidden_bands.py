@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from ars_web.geometry.rectangle_overlap import row_iou
 from ars_web.studies.compared_frames import Sides
 
 HIDDEN_BANDS: tuple[tuple[float, float], ...] = ((0.95, 1.0), (0.75, 0.95), (0.5, 0.75), (0.0, 0.5))
@@ -33,21 +34,13 @@ def hidden_bands(sides: Sides, visible: Float[np.ndarray, "m"]) -> tuple[HiddenB
     """The pairs of HIDDEN_BANDS, by the visible shares (m,) of the automatic labels."""
     pairs = sides.found.pairs
     shares = visible[pairs.second]
-    around_seen = _ious(sides.manual.bbox[pairs.first], sides.visible[pairs.second])
+    around_seen = row_iou(sides.manual.bbox[pairs.first], sides.visible[pairs.second])
     bands: list[HiddenBand] = []
     for lowest, highest in HIDDEN_BANDS:
         inside = (shares >= lowest) & ((shares < highest) | (highest == 1.0))
         seen = inside & ~np.isnan(around_seen)
         bands.append(HiddenBand(lowest, highest, int(inside.sum()), _mean(pairs.iou[inside]), _mean(around_seen[seen])))
     return tuple(bands)
-
-
-def _ious(first: Float[np.ndarray, "m 4"], second: Float[np.ndarray, "m 4"]) -> Float[np.ndarray, "m"]:
-    """Of each row with its own; NaN where a rectangle is."""
-    sides = np.minimum(first[:, 2:], second[:, 2:]) - np.maximum(first[:, :2], second[:, :2])
-    common = np.clip(sides, 0.0, None).prod(axis=1)
-    areas = [(one[:, 2:] - one[:, :2]).prod(axis=1) for one in (first, second)]
-    return common / (areas[0] + areas[1] - common)
 
 
 def _mean(values: Float[np.ndarray, "m"]) -> float | None:

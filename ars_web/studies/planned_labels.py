@@ -13,6 +13,7 @@ from ars_web.datasets.options import ExportOptions
 from ars_web.datasets.plan import plan_export
 from ars_web.datasets.planned import ExportPlan
 from ars_web.datasets.samples import DROP_REASONS
+from ars_web.geometry.even_spacing import evenly
 from ars_web.sessions.model import SessionSnapshot
 
 VISIBLE_FRAMES = 2_000
@@ -94,12 +95,6 @@ def plan_of(snapshot: SessionSnapshot, options: ExportOptions) -> ExportPlan:
         without_images = options.model_copy(update={"images": "none"})
         plan = plan_export([snapshot], format="coco", options=without_images, out=Path(folder) / "dataset")
     return replace(plan, options=options)
-
-
-def evenly(n: int, count: int) -> Int[np.ndarray, "m"]:
-    """`count` of n rows, or all of them, each from the middle of an equal share."""
-    count = min(n, count)
-    return (2 * np.arange(count) + 1) * n // (2 * max(count, 1))
 
 
 def _runs(n: int, b: int) -> Iterator[slice]:

@@ -3,13 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
-from jaxtyping import UInt8
 
 from ars_web.datasets.preview import draw_frame, spread
 from ars_web.datasets.splits import SPLITS
 from ars_web.errors import ArsError
+from ars_web.reporting.jpeg import jpeg
 from ars_web.reporting.page import data_uri, report_page
 from ars_web.studies.report_facts import BoxFacts, ClassFacts, SessionReport
 from ars_web.studies.report_figures import (
@@ -30,8 +29,6 @@ SAMPLES = 6
 
 SAMPLE_SIDE = 960
 """Pixels of a picture's longer side: sharp in two columns on a dense screen, and six of them are below a megabyte."""
-
-_JPEG = [cv2.IMWRITE_JPEG_QUALITY, 80]
 
 
 @dataclass(frozen=True)
@@ -95,7 +92,7 @@ def drawn_samples(study: SessionStudy, rows: Sequence[int]) -> list[Sample]:
         picture, problem = None, ""
         try:
             drawn = draw_frame(study.snapshot, index, shape=study.options.shape, only=kept)
-            picture = data_uri(_jpeg(drawn), media_type="image/jpeg")
+            picture = data_uri(jpeg(drawn, longest=SAMPLE_SIDE), media_type="image/jpeg")
         except ArsError as error:
             # Reports are passed on: where the recording lies is nobody's business.
             problem = str(error).replace(str(study.snapshot.frames.images[index]), plan.frames.names[row])
@@ -108,15 +105,6 @@ def _sample_rows(study: SessionStudy, count: int) -> list[int]:
     """Rows of labelled frames, spread evenly; of any where none is labelled."""
     labelled = np.flatnonzero(study.labels.keep.any(axis=1)).tolist()
     return spread(labelled or list(range(len(study.labels.plan.frames))), count)
-
-
-def _jpeg(picture: UInt8[np.ndarray, "h w 3"]) -> bytes:
-    scale = SAMPLE_SIDE / max(picture.shape[:2])
-    if scale < 1.0:
-        picture = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-    ok, content = cv2.imencode(".jpg", picture, _JPEG)
-    assert ok, "OpenCV cannot encode JPEG"
-    return content.tobytes()
 
 
 def _class_card(study: SessionStudy, facts: ClassFacts) -> ClassCard:

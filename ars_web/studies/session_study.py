@@ -5,14 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from ars_web.datasets.coverage import Coverage, SessionViews, coverage_of
+from ars_web.datasets.coverage import Coverage, coverage_of, views_where
 from ars_web.datasets.options import ExportOptions
 from ars_web.datasets.splits import SPLITS
 from ars_web.errors import BadInput
+from ars_web.geometry.even_spacing import evenly
 from ars_web.geometry.sphere_bins import SphereBins
-from ars_web.geometry.view_directions import view_directions
 from ars_web.sessions.model import SessionSnapshot
-from ars_web.studies.planned_labels import VISIBLE_FRAMES, PlannedLabels, evenly, planned_labels
+from ars_web.studies.planned_labels import VISIBLE_FRAMES, PlannedLabels, planned_labels
 from ars_web.studies.report_facts import SplitName
 from ars_web.studies.split_neighbours import ASKED_FRAMES, Neighbours, neighbours
 
@@ -65,22 +65,12 @@ def study_session(
     if options.sessions:
         raise BadInput("a report is of one session: leave out the sessions to merge with it")
     labels = planned_labels(snapshot, options, visible_frames=visible_frames)
-    centres = np.ascontiguousarray(labels.plan.frames.Ts_world_camera[:, :3, 3])
-    boxes = [box for _, box in sorted(snapshot.state.boxes.items())]
-    symmetries = tuple(snapshot.state.classes[box.class_id].symmetry for box in boxes)
-    directions = np.empty((len(boxes), len(centres), 3))
+    views = views_where(snapshot, labels.plan.frames.index, labels.keep)
+    centres = labels.plan.frames.Ts_world_camera[:, :3, 3]
     distances = np.full(len(centres), np.inf)
-    for row, (box, symmetry) in enumerate(zip(boxes, symmetries, strict=True)):
-        directions[row] = view_directions(centres, box.box, symmetry=symmetry)
-        away = np.linalg.norm(centres - box.box.T_world_box[:3, 3], axis=1)
+    for row, box_id in enumerate(views.box_ids):
+        away = np.linalg.norm(centres - snapshot.state.boxes[box_id].box.T_world_box[:3, 3], axis=1)
         distances = np.where(labels.keep[:, row], np.minimum(distances, away), distances)
-    views = SessionViews(
-        box_ids=tuple(box.id for box in boxes),
-        class_ids=tuple(box.class_id for box in boxes),
-        symmetries=symmetries,
-        directions=directions,
-        counted=np.ascontiguousarray(labels.keep.T),
-    )
 
     def seen(rows: list[int]) -> SeenFrom:
         return SeenFrom(coverage_of(views, FINE, rows), coverage_of(views, COARSE, rows))

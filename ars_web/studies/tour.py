@@ -37,7 +37,7 @@ from ars_web.geometry.view_proposals import (
     WantedObject,
     propose_views,
 )
-from ars_web.geometry.view_tour import RADIAN, pose_distances, tour
+from ars_web.geometry.view_tour import camera_turns, tour
 from ars_web.recordings.hand_eye import recorded_hand_eye
 from ars_web.sessions.model import SessionSnapshot
 
@@ -264,12 +264,11 @@ def plan_tour(snapshot: SessionSnapshot, views: SessionViews, rows: Sequence[int
     order = tour(start, np.array([stop.T_world_camera for stop in stops]).reshape(-1, 4, 4)).tolist()
     path = np.concatenate([start[None], *(stops[place].T_world_camera[None] for place in order)])
     steps = np.linalg.norm(np.diff(path[:, :3, 3], axis=0), axis=1)
-    between = np.arange(len(steps)), np.arange(1, len(path))
     return Tour(
         stops=tuple(stops[place] for place in order),
         start=start,
         length=float(steps.sum()),
-        turn=float((pose_distances(path)[between] - steps).sum() / RADIAN),
+        turn=float(camera_turns(path).sum()),
         limits=limits,
         from_recording=tuple(name for name in ("distance", "height", "tilt") if getattr(request, name) is None),
         lean=lean_of_world(frames.Ts_world_camera),

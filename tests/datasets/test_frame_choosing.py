@@ -19,7 +19,8 @@ from ars_web.datasets.splits import SPLITS
 from ars_web.errors import BadInput, NotFound
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box
-from ars_web.geometry.frame_selection import NOTHING, covered, evenly
+from ars_web.geometry.even_spacing import evenly
+from ars_web.geometry.frame_selection import NOTHING, covered
 from ars_web.geometry.sphere_bins import SphereBins
 from ars_web.sessions.model import SessionSnapshot
 

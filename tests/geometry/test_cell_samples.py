@@ -30,10 +30,25 @@ def test_samples_lie_in_their_cells_and_are_folded(bins: SphereBins, symmetry: S
     assert folded(flat, symmetry) == pytest.approx(flat, abs=1e-6)
 
 
-def test_the_first_sample_is_in_the_middle() -> None:
-    bins = SphereBins()
+@pytest.mark.parametrize("bins", [SphereBins(), SphereBins(1, 3)])
+def test_the_first_sample_is_in_the_middle(bins: SphereBins) -> None:
     aside = np.linalg.norm(cell_samples(bins, NO_SYMMETRY)[:, 0] - bins.cell_directions, axis=1)
     assert aside.max() < 0.02
+
+
+@pytest.mark.parametrize("symmetry", [NO_SYMMETRY, QUARTER])
+def test_samples_go_outward_and_stay_off_the_cell_s_border(symmetry: Symmetry) -> None:
+    bins = SphereBins(12, 6)
+    _, cells = reachable(bins, symmetry)
+    directions = folded(evenly_over_sphere(20_000), symmetry)
+    _, held = bins.of(directions)
+    for cell in np.flatnonzero(cells).tolist():
+        samples = cell_samples(bins, symmetry)[cell]
+        middle = bins.cell_directions[cell] if symmetry == NO_SYMMETRY else directions[held == cell].mean(axis=0)
+        aside = np.linalg.norm(samples - middle, axis=1)
+        assert (np.diff(aside) > -0.01).all()
+        inside = np.linalg.norm(directions[held == cell] - middle, axis=1)
+        assert 0.55 < (inside < aside[-1]).mean() < 0.75
 
 
 @pytest.mark.parametrize("symmetry", ALL)

@@ -1,5 +1,6 @@
 """Choosing frames, beside a slow greedy choice that looks at every frame anew, and beside even spacing."""
 
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ars_web.geometry.even_spacing import evenly
 from ars_web.geometry.frame_selection import (
     NO_TWINS,
     NOTHING,
@@ -15,7 +17,6 @@ from ars_web.geometry.frame_selection import (
     apart,
     covered,
     covering,
-    evenly,
     greedily,
     spread_order,
     tie_order,
@@ -49,6 +50,8 @@ def random_views(seed: int, *, n: int, b: int, cells: int) -> FrameViews:
 
 def is_twin(views: FrameViews, kept: int, other: int, near: Nearness) -> bool:
     """The definition, an object at a time."""
+    if views.recording[kept] != views.recording[other]:
+        return False
     if near.frames and abs(int(views.index[kept]) - int(views.index[other])) <= near.frames:
         return True
     labelled = np.flatnonzero(views.elements[other] != NOTHING)
@@ -130,6 +133,20 @@ def test_of_frames_that_add_as_much_the_rarest_go_first_so_that_no_twin_takes_th
     assert greedily(views_of(elements), 2, near=Nearness(0.0, 1)).tolist() == [2, 4]
 
 
+def test_one_direction_that_nobody_saw_is_worth_more_than_many_seen_once() -> None:
+    elements = np.full((3, 6), NOTHING)
+    elements[0], elements[1], elements[2, 0] = range(6), range(6), 9
+    assert greedily(views_of(elements), 2).tolist() == [0, 2]
+
+
+@pytest.mark.parametrize("apart_by", [2.9, 3.1])
+def test_twins_are_found_up_to_the_largest_angle(apart_by: float) -> None:
+    """Where the coordinate that frames are sorted by changes most with the angle."""
+    azimuths = np.radians(90.0 + np.array([[0.0], [apart_by], [90.0], [180.0]]))
+    found = twins_of(views_of(np.zeros((4, 1), dtype=np.int64), azimuths=azimuths), np.array([0]), Nearness(3.0))
+    assert found.tolist() == [False, apart_by < 3.0, False, False]
+
+
 def test_frames_that_add_as_much_lie_far_apart() -> None:
     chosen = covering(views_of(np.zeros((64, 1), dtype=np.int64)), 4)
     assert chosen.tolist() == [0, 16, 32, 48]
@@ -159,6 +176,26 @@ def test_a_walk_keeps_what_has_no_twin_before_it(near: Nearness) -> None:
     assert twins_of(views, np.array(kept), near).tolist() == marked
 
 
+@pytest.mark.parametrize("near", [Nearness(12.0, 0), Nearness(0.0, 3), Nearness(12.0, 2)])
+@pytest.mark.parametrize("axes", [[0, 1, 2], [2, 0, 1], [1, 2, 0]])
+def test_frames_of_two_recordings_are_no_twins_whichever_way_cameras_go_round(near: Nearness, axes: list[int]) -> None:
+    views = random_views(8, n=60, b=2, cells=12)
+    views = replace(
+        views,
+        directions=views.directions[..., axes],
+        recording=np.repeat([0, 1, 2], [25, 5, 30]),
+        index=np.concatenate([np.arange(25), 7 * np.arange(5), np.arange(30)]),
+    )
+    rows = np.array([2, 24, 25, 31, 59])
+    marked = [row not in rows and any(is_twin(views, one, row, near) for one in rows) for row in range(60)]
+    assert 5 < sum(marked) < 50
+    assert twins_of(views, rows, near).tolist() == marked
+    shuffled = np.random.default_rng(1).permutation(60)
+    places = np.array([int(np.flatnonzero(shuffled == row)[0]) for row in rows])
+    assert twins_of(views.of(shuffled), places, near).tolist() == np.array(marked)[shuffled].tolist()
+    assert greedily(views, 20, near=near).tolist() == dense_greedy(views, 20, near)
+
+
 def test_twins_show_nothing_more_from_about_the_same_place() -> None:
     elements = np.array([[0, 10], [0, NOTHING], [0, 10], [NOTHING, NOTHING], [NOTHING, NOTHING], [0, 10]])
     azimuths, distances = np.radians([[0, 0], [2, 50], [2, 3.5], [0, 0], [0, 0], [1, 1]]), np.ones((6, 2))
@@ -171,12 +208,6 @@ def test_twins_show_nothing_more_from_about_the_same_place() -> None:
     assert twins_of(views, np.array([0]), Nearness(3.0)).tolist() == [False, True, False, False, False, True]
     two = FrameViews(elements, views.directions, distances, np.array([0, 1, 0, 0, 0, 1]), np.arange(6))
     assert twins_of(two, np.array([0]), Nearness(3.0, 9)).tolist() == [False, False, True, True, True, False]
-
-
-def test_even_spacing_takes_the_middles_of_equal_stretches() -> None:
-    assert evenly(10, 5).tolist() == [1, 3, 5, 7, 9]
-    assert evenly(3, 9).tolist() == [0, 1, 2]
-    assert evenly(0, 4).tolist() == []
 
 
 def test_sessions_without_objects_or_frames_have_nothing_to_cover() -> None:

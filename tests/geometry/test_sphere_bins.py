@@ -57,6 +57,28 @@ def test_poles_and_axes_fall_where_they_should() -> None:
     assert (angles // bins.polar).tolist()[2:] == [18, 35]
 
 
+def test_on_an_edge_the_bin_after_it_begins() -> None:
+    assert SphereBins(1, 2).of(np.array([[1.0, 0.0, 0.0], [1.0, 0.0, 1e-9]]))[1].tolist() == [1, 0]
+    # Azimuth 0 begins the second of two, and pi is the end of the last.
+    angles, cells = SphereBins(2, 1).of(np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]))
+    assert angles.tolist() == [1, 1]
+    bins = SphereBins()
+    _, cells = bins.of(np.array([[-1.0, 0.0, 0.0], [-1.0, -1e-9, 0.0]]))
+    band = int(np.searchsorted(-bins.band_edges, 0.0, side="right")) - 1
+    assert cells.tolist() == [bins.cell_starts[band + 1] - 1, bins.cell_starts[band]]
+
+
+def test_the_middle_of_a_cap_is_its_pole_and_of_a_cell_as_far_from_both_its_sides() -> None:
+    bins = SphereBins()
+    assert bins.cell_directions[[0, -1]].tolist() == pytest.approx(np.array([[0, 0, 1], [0, 0, -1]]), abs=1e-15)
+    for band in range(1, len(bins.bands) - 1):
+        first = bins.cell_directions[bins.cell_starts[band]]
+        width = 2 * np.pi / bins.bands[band]
+        assert np.arctan2(first[1], first[0]) == pytest.approx(-np.pi + width / 2)
+        above, below = np.arccos(bins.band_edges[band : band + 2])
+        assert np.arccos(first[2]) == pytest.approx((above + below) / 2)
+
+
 def test_what_is_no_direction_has_no_bin() -> None:
     angles, cells = SphereBins().of(np.array([[0.0, 0.0, 0.0], [np.nan, 0.0, 1.0], [np.inf, 0.0, 0.0]]))
     assert angles.tolist() == cells.tolist() == [NOWHERE] * 3

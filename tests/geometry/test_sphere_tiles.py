@@ -1,5 +1,7 @@
 """Bins and cells as they are drawn: patches that hold their directions, and meshes seen from outside."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -50,6 +52,26 @@ def test_tiles_cover_the_sphere_but_for_the_gaps_between_them(bins: SphereBins) 
     owners = apart.owners[np.abs(apart.vertices[:, 2]) < 1.0 - 1e-9]
     assert bins.of(inside)[1].tolist() == owners.tolist() or bins.cells == 1
     assert outward(apart).sum() <= areas.sum()
+
+
+def test_the_gap_between_tiles_is_as_wide_near_a_pole_as_at_the_equator() -> None:
+    bins, gap = SphereBins(18, 9), math.radians(0.5)
+    mesh = tiles(cell_patches(bins), gap=gap)
+    for band in range(1, len(bins.bands) - 1):
+        x, y, _ = mesh.vertices[mesh.owners == bins.cell_starts[band] + bins.bands[band] // 2].T
+        apart = 2 * np.pi / bins.bands[band] - np.ptp(np.arctan2(y, x))
+        assert apart * np.hypot(x, y).max() == pytest.approx(2 * gap, rel=0.01)
+
+
+def test_caps_reach_their_pole_and_close_all_round() -> None:
+    bins = SphereBins(18, 9)
+    mesh = tiles(cell_patches(bins), gap=math.radians(1.0))
+    for cell, pole in ((0, 1.0), (bins.cells - 1, -1.0)):
+        cap = mesh.vertices[mesh.owners == cell]
+        assert np.abs(cap[:, 2]).max() == 1.0
+        assert np.sign(cap[0, 2]) == pole
+        rim = cap[np.isclose(np.abs(cap[:, 2]), np.abs(cap[:, 2]).min())]
+        assert np.allclose(rim[0], rim[-1]), "its first and its last meridian are one"
 
 
 def test_dots_are_round_spots_seen_from_outside() -> None:

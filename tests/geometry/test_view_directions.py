@@ -61,6 +61,9 @@ def test_turns_about_z_leave_an_azimuth_between_edges_of_bins() -> None:
     assert azimuths.min() > -1e-9
     assert azimuths.max() < np.pi / 2 + 1e-9
     assert (folded(evenly_over_sphere(5000), BRICK)[:, 2] > -1e-9).all()
+    bottle = folded(evenly_over_sphere(500), BOTTLE)
+    aside = np.arctan2(bottle[:, 1], bottle[:, 0])[np.abs(bottle[:, 2]) < 0.999]
+    assert 0.01 < aside.min() <= aside.max() < np.radians(5.0), "off the edge at 0 degrees, in narrow bins too"
     assert (folded(evenly_over_sphere(5000), TIN)[:, 2] > -1e-9).all()
 
 

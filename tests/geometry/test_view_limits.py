@@ -46,6 +46,12 @@ def test_straight_down_and_up_the_image_s_x_is_the_world_s() -> None:
     assert tilts_of(Ts) == pytest.approx([math.pi / 2, -math.pi / 2])
 
 
+def test_rounding_turns_no_camera_that_looks_straight_down() -> None:
+    aside = 1e-13 * np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, -1.0, 0.0]])
+    Ts = looking_at(np.array([0.0, 0.0, 2.0]) + aside, np.zeros((3, 3)))
+    assert Ts[:, :3, :3] == pytest.approx(np.tile(np.diag([1.0, -1.0, -1.0]), (3, 1, 1)))
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
@@ -58,9 +64,11 @@ def test_straight_down_and_up_the_image_s_x_is_the_world_s() -> None:
         ({"distance": (-0.1, 0.3)}, "a distance must be more than 0 m, not -0.1 to 0.3"),
         ({"distance": (0.0, 0.0)}, "a distance must be more than 0 m"),
         ({"tilt": (0.0, 2.0)}, "a tilt lies between -90 degrees, straight up, and 90, straight down, not 0 to 114.592"),
+        ({"tilt": (-2.0, 0.0)}, "straight up, and 90, straight down, not -114.592 to 0"),
         ({"min_visible": 1.5}, "from 0 to 1, not 1.5"),
         ({"min_visible": math.nan}, "from 0 to 1, not nan"),
         ({"clearance": -0.1}, "the clearance must be 0 m or more, not -0.1"),
+        ({"clearance": math.inf}, "the clearance must be 0 m or more, not inf"),
     ],
 )
 def test_limits_that_cannot_be(changes: dict[str, object], said: str) -> None:
@@ -71,6 +79,9 @@ def test_limits_that_cannot_be(changes: dict[str, object], said: str) -> None:
 def test_limits_that_leave_no_room_are_named() -> None:
     check_room(limits(), [cube_at(0.1)])
     check_room(limits(height=(2.5, 3.0)), [cube_at(0.1), cube_at(2.3)])
+    # From near the camera is low enough, from far it is not; looking up it may be below.
+    check_room(limits(height=(0.1, 0.3), distance=(0.3, 3.0), tilt=(0.5, 0.6)), [cube_at(0.0)])
+    check_room(limits(height=(-1.0, -0.5), distance=(0.3, 3.0), tilt=(-0.5, 0.6)), [cube_at(0.0)])
     with pytest.raises(BadInput, match=r"no camera is 2\.5 to 3 m high and within 0\.6 m of an object"):
         check_room(limits(height=(2.5, 3.0)), [cube_at(0.1)])
     with pytest.raises(

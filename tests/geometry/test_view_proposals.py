@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from ars_web.geometry import view_proposals
 from ars_web.geometry.box import Box
 from ars_web.geometry.camera import Camera
 from ars_web.geometry.labels import labels_of_boxes
@@ -168,3 +169,83 @@ def test_nothing_wanted_is_nothing_proposed() -> None:
     full = wanted(boxes, counts=np.ones(BINS.cells, dtype=int), wanted=np.zeros(BINS.cells, dtype=bool))
     found = proposed(boxes, [full])
     assert (found.views, found.left) == ((), ())
+
+
+def test_however_many_poses_are_looked_at_together_the_views_are_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    boxes = [cuboid(), cuboid(0.22), cuboid(0.1, 0.3, size=(0.05, 0.2, 0.1))]
+    objects = [wanted(boxes, 0), wanted(boxes, 1, symmetry=QUARTER)]
+    expected = proposed(boxes, objects)
+    monkeypatch.setattr(view_proposals, "LOOKED_AT_ONCE", 20)
+    found = proposed(boxes, objects)
+    assert [view.fills for view in found.views] == [view.fills for view in expected.views]
+    assert [view.labelled for view in found.views] == [view.labelled for view in expected.views]
+    assert found.left == expected.left
+
+
+def test_of_poses_that_add_as_much_the_same_one_is_chosen_whatever_is_rounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    boxes, exact = [cuboid()], view_proposals._gaps
+    expected = credited(proposed(boxes, [wanted(boxes)]))
+    random = np.random.default_rng(0)
+
+    def rounded(bins: SphereBins, seen: np.ndarray) -> np.ndarray:
+        return exact(bins, seen) + random.normal(0.0, 1e-15, bins.cells)
+
+    monkeypatch.setattr(view_proposals, "_gaps", rounded)
+    assert credited(proposed(boxes, [wanted(boxes)])) == expected
+
+
+def test_each_view_is_as_far_as_can_be_from_those_before_it() -> None:
+    boxes = [cuboid()]
+    cells = [cell for _, cell in credited(proposed(boxes, [wanted(boxes)], count=3))]
+    first, second, third = BINS.cell_directions[cells]
+    assert first @ second == pytest.approx(-1.0)
+    assert abs(first @ third) < 0.3
+
+
+def test_an_object_that_no_export_would_label_is_not_seen() -> None:
+    boxes = [cuboid()]
+
+    def unlabelled(Ts: np.ndarray) -> Shown:
+        shown = look_at(boxes)(Ts)
+        return Shown(shown.bbox_amodal, np.zeros_like(shown.labelled), shown.visible)
+
+    found = propose_views([wanted(boxes)], BINS, ANYWHERE, camera=CAMERA, obstacles=boxes, look=unlabelled, count=None)
+    assert found.views == ()
+    assert {why for _, _, why in found.left} == {"hidden"}
+
+
+def test_where_the_middle_of_a_cell_will_not_do_another_place_in_it_may() -> None:
+    boxes, elevations = [cuboid()], np.unique(np.arcsin(BINS.cell_directions[:, 2]).round(6))
+    between = (elevations[-2] + elevations[-3]) / 2
+    tilt = between - math.radians(3), between + math.radians(3)
+    assert not ((elevations >= tilt[0]) & (elevations <= tilt[1])).any()
+    found = proposed(boxes, [wanted(boxes)], ViewLimits((0.3, 0.8), (-2.0, 2.0), tilt))
+    assert len(found.views) > 5
+    assert all(tilt[0] <= view.tilt <= tilt[1] for view in found.views)
+
+
+def chosen_in_order(objects: list[WantedObject], cells: list[list[int]]) -> list[int]:
+    """The numbers of made-up poses, each of which sees objects from these cells, in the order in which they are
+    chosen."""
+    m = len(cells)
+    Ts = np.tile(np.eye(4), (m, 1, 1))
+    Ts[:, 0, 3] = np.arange(m)
+    tried = view_proposals._Tried(
+        Ts,
+        np.zeros(m, dtype=int),
+        np.ones((m, len(objects)), dtype=bool),
+        np.array(cells),
+        np.zeros((len(objects), BINS.cells), dtype=int),
+    )
+    return [int(view.T_world_camera[0, 3]) for view in view_proposals._chosen(tried, objects, BINS, None)]
+
+
+def test_of_views_that_fill_as_much_those_go_first_that_see_others_where_they_are_thinly_seen() -> None:
+    boxes = [cuboid(x) for x in (0.0, 1.0, 2.0, 3.0)]
+    counts = np.ones(BINS.cells, dtype=int)
+    counts[5] = 9
+    full = wanted(boxes, 3, counts=counts, wanted=np.zeros(BINS.cells, dtype=bool))
+    objects = [*(wanted(boxes, place) for place in range(3)), full]
+    assert chosen_in_order(objects, [[7, -1, -1, 5], [-1, 7, -1, 6]]) == [1, 0]
+    # Once seen from cell 6 it is less worth to see it from there again than from cell 8.
+    assert chosen_in_order(objects, [[7, -1, -1, 6], [-1, 7, -1, 6], [-1, -1, 7, 8]]) == [0, 2, 1]

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from ars_web.geometry.rigid_transform import rotation_from_wxyz
 from ars_web.geometry.view_sector import azimuths_round, in_sector
 
 
@@ -49,3 +50,39 @@ def test_every_camera_is_on_one_side_of_an_edge() -> None:
         one, other = (in_sector(azimuths, start=edge + a, stop=edge + a + 180.0) for a in (0.0, 180.0))
         assert (one ^ other).all()
         assert one.sum() == 24
+
+
+@pytest.mark.parametrize("width", [0.3, 10.0, 45.3, 120.7])
+def test_a_camera_on_an_edge_is_in_one_of_two_sectors_that_meet_there(width: float) -> None:
+    for tenth in range(-3600, 3600, 7):
+        start = tenth / 10
+        edge = np.array([round((start + width) % 360.0, 9)])
+        before = in_sector(edge, start=start, stop=start + width)
+        after = in_sector(edge, start=start + width, stop=start + 2 * width)
+        assert (before.tolist(), after.tolist()) == ([False], [True]), start
+        first = np.array([round(start % 360.0, 9)])
+        assert in_sector(first, start=start, stop=start + width).all(), start
+
+
+def test_a_whole_turn_has_all_wherever_it_begins() -> None:
+    azimuths = np.array([0.0, 152.1, 152.2, 359.9, np.nan])
+    for tenth in range(-3600, 3600):
+        assert in_sector(azimuths, start=tenth / 10, stop=tenth / 10 + 360.0).all(), tenth
+
+
+def test_an_edge_that_no_binary_number_is_parts_cameras_that_stand_on_it() -> None:
+    turn = np.radians(np.arange(0.1, 360.0, 0.1))
+    azimuths = azimuths_round(np.column_stack([np.cos(turn), np.sin(turn), turn]), np.eye(4))
+    for place in range(0, len(turn) - 1, 50):
+        start = round(0.1 * (place + 1), 1)
+        assert np.flatnonzero(in_sector(azimuths, start=start, stop=start + 0.1)).tolist() == [place]
+
+
+def test_on_the_z_axis_there_is_no_azimuth_however_the_frame_lies() -> None:
+    T_world_about = np.eye(4)
+    T_world_about[:3, :3] = rotation_from_wxyz(np.array([0.9, 0.1, 0.3, 0.2]) / np.sqrt(0.95))
+    T_world_about[:3, 3] = 1.0, 2.0, 3.0
+    along = np.array([-1.1, 0.0, 0.3, 0.5, 0.7])[:, None] * T_world_about[:3, 2]
+    assert np.isnan(azimuths_round(T_world_about[:3, 3] + along, T_world_about)).all()
+    beside = along + 1e-6 * T_world_about[:3, 1]
+    assert azimuths_round(T_world_about[:3, 3] + beside, T_world_about) == pytest.approx(90.0, abs=1e-6)

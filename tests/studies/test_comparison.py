@@ -375,7 +375,9 @@ def test_a_report_without_pairs_or_pictures_says_so(make_session: Callable[..., 
     assert "There is no label to compare." in comparison_page(found, session, name="table")
     found = study(session, by_hand({"a.png": [("cup", [0, 0, 5, 5])]}))
     page = comparison_page(found, session, name="table")
-    assert "No picture:" in page
+    assert "No picture: a.png" in page
+    # Reports are passed on.
+    assert str(session.frames.images[0].parent) not in page
     assert "data:image" not in page
 
 
