@@ -4788,6 +4788,11 @@ export interface components {
             left_by_reason: {
                 [key: string]: number;
             };
+            /**
+             * Doubts
+             * @description what may make the views other than they seem, in words; mostly none
+             */
+            doubts: string[];
         };
         /**
          * TourLimitsJson

@@ -147,6 +147,7 @@ def test_a_file_is_written_whole_or_not_at_all(command: Command, tmp_path: Path,
 
 def test_a_world_whose_z_may_not_be_up_is_doubted(command: Command, tmp_path: Path, ring_scene: ModuleType) -> None:
     assert "off the world's z" not in command("--count", "1", *FEW)[0]
+    assert json.loads(command("--count", "1", *FEW, "--json")[0])["doubts"] == []
     sessions = tmp_path / "on_side"
     on_side = np.eye(4)
     on_side[:3, :3] = turn_about(np.array([1.0, 0.0, 0.0]), np.pi / 2)
@@ -160,3 +161,5 @@ def test_a_world_whose_z_may_not_be_up_is_doubted(command: Command, tmp_path: Pa
     lines = command("--count", "1", *FEW, sessions=sessions)[0].splitlines()
     (doubt,) = (line for line in lines if "off the world's z" in line)
     assert doubt.startswith("the cameras are level about an axis 90 degrees off the world's z: if that is not up,")
+    told = json.loads(command("--count", "1", *FEW, "--json", sessions=sessions)[0])
+    assert told["doubts"] == [doubt]

@@ -190,6 +190,17 @@ class Tour:
         counted = Counter(cell.reason for cell in self.left)
         return {reason: counted[reason] for reason in REASONS if counted[reason]}
 
+    @property
+    def doubts(self) -> list[str]:
+        """What may make the views other than they seem, in words."""
+        if self.lean <= LEANS:
+            return []
+        return [
+            f"the cameras are level about an axis {math.degrees(self.lean):.0f} degrees off the world's z: if that is"
+            " not up, heights and tilts are not what they say; turn the recording's poses so that z is up, and import"
+            " it again"
+        ]
+
     def lines(self) -> list[str]:
         """What a person wants to know of it, as lines to print."""
         limits = self.limits
@@ -202,12 +213,7 @@ class Tour:
             text + (" (as the frames)" if name in self.from_recording else "") for name, text in said.items()
         )
         lines = [f"limits: {kept_to}; at least {limits.min_visible:.0%} visible"]
-        if self.lean > LEANS:
-            lines.append(
-                f"the cameras are level about an axis {math.degrees(self.lean):.0f} degrees off the world's z: if that"
-                " is not up, heights and tilts are not what they say; turn the recording's poses so that z is up, and"
-                " import it again"
-            )
+        lines += self.doubts
         if not self.empty:
             return [*lines, f"nothing is empty: frames lie in all of the {self.cells} cells"]
         lines.append(

@@ -75,6 +75,7 @@ class TourJson(_Record):
     cells_filled: int = Field(description="of the empty ones, those that the views fill")
     cells_left: list[CellLeftJson] = Field(description="the other empty ones")
     left_by_reason: dict[Reason, int]
+    doubts: list[str] = Field(description="what may make the views other than they seem, in words; mostly none")
 
 
 def tour_json(tour: Tour, *, T_wrist_camera: Transform | None) -> TourJson:
@@ -98,6 +99,7 @@ def tour_json(tour: Tour, *, T_wrist_camera: Transform | None) -> TourJson:
         cells_filled=tour.filled,
         cells_left=[CellLeftJson(box_id=one.box_id, cell=one.cell, reason=one.reason) for one in tour.left],
         left_by_reason=tour.left_by_reason,
+        doubts=tour.doubts,
     )
 
 

@@ -105,6 +105,7 @@ function Result({ tour, stale }) {
       ? cells_empty === 0 ? "Every direction has been seen: there is nothing to fill." : "No view within these limits fills a hole. Allow more."
       : html`<strong>${views.length} ${views.length === 1 ? "view" : "views"}</strong> fill ${cells_filled.toLocaleString("en")} of ${cells_empty.toLocaleString("en")} holes, on a way of ${length.toFixed(2)} m.`}
       ${stale && html`<span class="problem">The session was changed since: plan again.</span>`}</p>
+    ${tour.doubts.map((doubt) => html`<p class="problem" key=${doubt}>${doubt[0].toUpperCase()}${doubt.slice(1)}.</p>`)}
     ${views.length > 0 &&
     html`<ol class="tour-views">
       ${views.map((view, i) => {
