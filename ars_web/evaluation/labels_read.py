@@ -76,12 +76,12 @@ class LabelsRead:
         said = [*warnings]
         flat = int((sides <= 0).any(axis=1).sum())
         if flat:
-            said.append(f"{part}: {flat} labels have no area; nothing can find them, so they count as missed")
+            said.append(f"{part}: labels without an area: {flat}; nothing can find them, so they count as missed")
         rows = np.column_stack([image, class_, bbox]) if len(bbox) else np.zeros((0, 6))
         repeated = len(rows) - len(np.unique(rows, axis=0))
         if repeated:
             said.append(
-                f"{part}: {repeated} labels repeat another of the same class and rectangle in their image; of such a"
+                f"{part}: labels that repeat another of the same class and rectangle in their image: {repeated}; of such a"
                 " pair one stays missed"
             )
         return Truth(

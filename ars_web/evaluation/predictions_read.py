@@ -182,7 +182,7 @@ class PredictionsRead:
         sides = bbox[:, 2:] - bbox[:, :2]
         flat = int((sides <= 0).any(axis=1).sum())
         if flat:
-            warnings.append(f"{source}: {flat} predictions have no area; they find nothing and count as wrong")
+            warnings.append(f"{source}: predictions without an area: {flat}; they find nothing and count as wrong")
         if format != "yolo" and len(bbox) and bbox.max() <= 1.0:
             warnings.append(
                 f"{source}: no rectangle reaches beyond 1; if they are shares of images, write pixels instead"
@@ -190,12 +190,12 @@ class PredictionsRead:
         rows = np.column_stack([image, class_, bbox, score]) if len(bbox) else np.zeros((0, 7))
         repeated = len(rows) - len(np.unique(rows, axis=0))
         if repeated:
-            warnings.append(f"{source}: {repeated} predictions repeat another in everything; they count as wrong")
+            warnings.append(f"{source}: predictions that repeat another in everything: {repeated}; they count as wrong")
         labelled = set(self.truth.class_[~self.truth.ignored].tolist())
         for place in sorted(set(self.class_) - labelled):
             count = int((class_ == place).sum())
             warnings.append(
-                f"{source}: {count} predictions are of {self.truth.classes[place]!r}, which is labelled nowhere; they"
-                " count as wrong, and in no mean of AP"
+                f"{source}: predictions of {self.truth.classes[place]!r}, which is labelled nowhere: {count}; they count"
+                " as wrong, and in no mean of AP"
             )
         return Predictions(name, image, class_, bbox, score, str(source), format, tuple(warnings))

@@ -147,8 +147,8 @@ def test_a_header_that_lacks_a_column_is_named(truth: Truth, tmp_path: Path) -> 
 def test_what_is_odd_is_told(truth: Truth, tmp_path: Path) -> None:
     row = "0009.jpg,cube,0.1,0.2,0.3,0.4,0.5\n"
     said = "\n".join(read_csv(truth, tmp_path, row + row + "0009.jpg,cube,0.1,0.2,0.1,0.4,0.5\n").warnings)
-    assert "1 predictions repeat another" in said
-    assert "1 predictions have no area" in said
+    assert "predictions that repeat another in everything: 1;" in said
+    assert "predictions without an area: 1;" in said
     assert "no rectangle reaches beyond 1" in said
     assert "holds no prediction" in read_csv(truth, tmp_path, "").warnings[0]
 
@@ -358,7 +358,7 @@ def test_predictions_of_a_class_that_is_labelled_nowhere_are_told(truth: Truth, 
         numbers=truth.numbers,
     )
     found = read_yolo(few, tmp_path, "1 0.5 0.5 0.2 0.2 0.9\n")
-    assert "1 predictions are of 'a \"tall\" & <odd> one: #1', which is labelled nowhere" in found.warnings[0]
+    assert "predictions of 'a \"tall\" & <odd> one: #1', which is labelled nowhere: 1;" in found.warnings[0]
 
 
 def test_the_packages_example_runs_as_it_is_written(truth: Truth, tmp_path: Path, monkeypatch) -> None:

@@ -242,8 +242,8 @@ def test_labels_that_are_odd_are_told(tmp_path: Path) -> None:
     rows = "0 0.5 0.5 0.2 0.2\n0 0.5 0.5 0.2 0.2\n0 0.5 0.5 0.2 0\n"
     folder = _yolo(tmp_path, "val: images\nnames: [a]\n", labels__x=rows)
     said = "\n".join(read_truth(folder, image_size=(10, 10)).warnings)
-    assert "1 labels have no area" in said
-    assert "1 labels repeat another" in said
+    assert "labels without an area: 1;" in said
+    assert "labels that repeat another of the same class and rectangle in their image: 1;" in said
 
 
 def _coco(change: Callable[[dict], object]) -> Callable[[Path], Path]:
