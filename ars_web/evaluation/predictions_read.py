@@ -195,7 +195,7 @@ class PredictionsRead:
         for place in sorted(set(self.class_) - labelled):
             count = int((class_ == place).sum())
             warnings.append(
-                f"{source}: predictions of {self.truth.classes[place]!r}, which is labelled nowhere: {count}; they count"
-                " as wrong, and in no mean of AP"
+                f"{source}: predictions of {self.truth.classes[place]!r}, which is labelled nowhere: {count}; they"
+                " count as wrong, and in no mean of AP"
             )
         return Predictions(name, image, class_, bbox, score, str(source), format, tuple(warnings))
