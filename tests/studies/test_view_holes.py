@@ -21,7 +21,7 @@ def seen(places: list[tuple[int, int]], *, reachable: np.ndarray | None = None, 
         counts[place] += 1
     there = np.ones(counts.shape, dtype=bool) if reachable is None else reachable
     cells = np.zeros(bins.cells, dtype=np.int64)
-    return Coverage(bins, counts, there, cells, np.ones(bins.cells, dtype=bool), len(places), len(places), 0)
+    return Coverage(bins, counts, there, cells, np.ones(bins.cells, dtype=bool), len(places), len(places))
 
 
 def everywhere_but(azimuths: range, polars: range) -> list[tuple[int, int]]:
