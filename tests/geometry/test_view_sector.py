@@ -46,6 +46,7 @@ def test_a_whole_turn_has_all_and_none_has_nothing() -> None:
 def test_every_camera_is_on_one_side_of_an_edge() -> None:
     turn = np.radians(np.arange(0.0, 360.0, 7.5))
     azimuths = azimuths_round(np.column_stack([np.cos(turn), np.sin(turn), turn]), np.eye(4))
+    assert azimuths.tolist() == np.arange(0.0, 360.0, 7.5).tolist(), "whole gaps between them are equally wide, too"
     for edge in (0.0, 7.5, 45.0, 187.5):
         one, other = (in_sector(azimuths, start=edge + a, stop=edge + a + 180.0) for a in (0.0, 180.0))
         assert (one ^ other).all()
