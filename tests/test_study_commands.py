@@ -78,3 +78,8 @@ def test_what_is_wrong_is_said(command: Command, options: tuple[str, ...], statu
     assert out == ""
     assert said in err
     assert len(err.splitlines()) == 1
+
+
+def test_of_one_box_its_class_is_not_told(command: Command) -> None:
+    lines = command("coverage", "--box", "1")[0].splitlines()
+    assert [line.split()[:2] for line in lines[1:]] == [["box", "ball"]]
