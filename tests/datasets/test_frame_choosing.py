@@ -318,8 +318,10 @@ def test_frames_are_chosen_by_the_images_as_they_are_written(make_snapshot: Make
 def test_a_camera_at_the_centre_of_a_box_adds_no_direction(make_snapshot: Make, tmp_path: Path) -> None:
     T_world_box = np.eye(4)
     T_world_box[:3, 3] = make_snapshot(30).frames.Ts_world_camera[4, :3, 3]
-    snapshot = make_snapshot(30, objects=[Box(T_world_box, np.full(3, 0.1))])
-    elements = directions_in_frames(session_views(snapshot, options()))
-    assert elements[4, 0] == NOTHING
-    assert set(np.unique(elements)) <= {NOTHING, *range(648)}
+    snapshot = make_snapshot(30, objects=[*CUBE, Box(T_world_box, np.full(3, 0.1))])
+    views = session_views(snapshot, options())
+    elements = directions_in_frames(views)
+    assert views.counted[1, 4]
+    assert elements[4, 1] == NOTHING
+    assert set(np.unique(elements[:, 1])) <= {NOTHING, *range(648, 2 * 648)}
     assert forecast(plan_of(snapshot, out=tmp_path / "d")).directions.all == covered(elements)

@@ -126,6 +126,15 @@ def test_the_sphere_stands_round_the_box_and_is_drawn_anew_only_for_another_coun
     visitor.listen_until(lambda v: v.nodes["/coverage"]["visible"] is False)
 
 
+def test_in_the_other_theme_holes_have_its_colours(visitor: Any, scenes: SceneServers, sid: str) -> None:
+    was = mesh_of(visitor)
+    scenes.show(sid, VIEW, ViewState(coverage=SIGHT, dark=not ViewState().dark))
+    visitor.listen_until(lambda v: mesh_of(v) != was)
+    before, after = of_cells(was)[0], of_cells(mesh_of(visitor))[0]
+    hole = min(after, key=lambda color: color[3])
+    assert hole not in before
+
+
 def test_a_click_on_the_sphere_is_a_direction_and_beside_it_is_not(
     visitor: Any, store: SessionStore, sid: str, events: "queue.Queue[ViewEvent]"
 ) -> None:
