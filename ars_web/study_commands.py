@@ -130,7 +130,8 @@ def tour(
     from ars_web.recordings.ars import camera_in_wrist
     from ars_web.reporting.whole_file import write_whole
     from ars_web.sessions.store import SessionStore
-    from ars_web.studies.tour import TourRequest, plan_tour, recorded_wrist
+    from ars_web.studies.recorded_wrist import recorded_wrist
+    from ars_web.studies.tour import TourRequest, plan_tour
     from ars_web.studies.tour_json import tour_json, wrist_rows
 
     if out is not None and out.suffix.lower() not in (".json", ".txt"):
@@ -189,10 +190,6 @@ def tour(
         print(out)
 
 
-def _percent(share: float) -> str:
-    return f"{100 * share:.1f} %"
-
-
 @app.command()
 @grouped
 def report(
@@ -238,3 +235,7 @@ def report(
         for warning in facts.warnings:
             print(f"{'grave' if warning.grave else 'warning'}: {warning.says}")
         print(out)
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.1f} %"

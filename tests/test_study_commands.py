@@ -90,3 +90,8 @@ def test_a_file_is_written_whole_or_not_at_all(command: Command, tmp_path: Path,
     _, err = command("coverage", "--out", str(taken), status=1)
     assert err.startswith(f"ars-web: {taken} cannot be written: Is a directory; name a file in a folder")
     assert [one.name for one in taken.parent.iterdir()] == [name]
+
+
+def test_of_one_box_its_class_is_not_told(command: Command) -> None:
+    lines = command("coverage", "--box", "1")[0].splitlines()
+    assert [line.split()[:2] for line in lines[1:]] == [["box", "ball"]]

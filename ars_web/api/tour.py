@@ -13,7 +13,8 @@ from ars_web.datasets.coverage import chosen_boxes
 from ars_web.errors import BadInput
 from ars_web.geometry.sphere_bins import MOST_BINS, SphereBins
 from ars_web.sessions.boxes_json import Id
-from ars_web.studies.tour import MOST_VIEWS, TourRequest, plan_tour, recorded_wrist
+from ars_web.studies.recorded_wrist import recorded_wrist
+from ars_web.studies.tour import MOST_VIEWS, TourRequest, plan_tour
 from ars_web.studies.tour_json import TourJson, tour_json
 
 router = APIRouter(prefix="/api/sessions/{sid}/coverage/tour", tags=["coverage"], route_class=StrictRoute)

@@ -54,8 +54,8 @@ class Coverage:
         reachable: (a, p) whether directions folded by the objects' symmetry can lie there at all.
         cell_counts, cells_reachable: (k,) the same of the cells.
         frames: in which any of the objects is labelled.
-        views: labels of the objects in all frames, which `counts` and `away` add up to.
-        away: views of a camera at the object's very centre, which have no direction.
+        views: labels of the objects in all frames; `counts` are as many, but for those of a camera at the object's very
+            centre, which have no direction.
     """
 
     bins: SphereBins
@@ -65,7 +65,6 @@ class Coverage:
     cells_reachable: Bool[np.ndarray, "k"]
     frames: int
     views: int
-    away: int
 
     @property
     def empty_fraction(self) -> float:
@@ -151,7 +150,6 @@ def coverage_of(views: SessionViews, bins: SphereBins, rows: Sequence[int]) -> C
         cells_reachable=cells_reachable | (cell_counts > 0),
         frames=int(counted.any(axis=0).sum()),
         views=int(counted.sum()),
-        away=int(found[0, 0]),
     )
 
 

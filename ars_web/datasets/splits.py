@@ -133,8 +133,8 @@ def apportion(units: int, shares: Sequence[float]) -> list[int]:
     """How many of `units` each share gets: largest remainders, and at least one for a positive share where there
     are as many units as positive shares."""
     exact = [share * units for share in shares]
-    # 0.8 * 30 is 23.999...: a share that means a whole number gets it.
-    counts = [int(value + 1e-9) for value in exact]
+    # 0.29 * 100 is 28.999...: its remainder is then the largest, so that it gets the whole number all the same.
+    counts = [int(value) for value in exact]
     by_remainder = sorted(range(len(shares)), key=lambda i: (counts[i] - exact[i], i))
     for i in by_remainder[: units - sum(counts)]:
         counts[i] += 1

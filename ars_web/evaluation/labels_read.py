@@ -81,8 +81,8 @@ class LabelsRead:
         repeated = len(rows) - len(np.unique(rows, axis=0))
         if repeated:
             said.append(
-                f"{part}: labels that repeat another of the same class and rectangle in their image: {repeated}; of such"
-                " a pair one stays missed"
+                f"{part}: labels that repeat another of the same class and rectangle in their image: {repeated}; of"
+                " such a pair one stays missed"
             )
         return Truth(
             part,

@@ -41,13 +41,13 @@ class SphereBins:
                 raise BadInput(f"the number of {name} bins must be from 1 to {MOST_BINS}, not {count}")
 
     @cached_property
-    def azimuth_edges(self) -> Float[np.ndarray, "a"]:
-        """Radians, from -pi to pi."""
+    def azimuth_edges(self) -> Float[np.ndarray, "edges"]:
+        """(azimuth + 1,) radians, from -pi to pi."""
         return np.linspace(-np.pi, np.pi, self.azimuth + 1)
 
     @cached_property
-    def polar_edges(self) -> Float[np.ndarray, "p"]:
-        """Radians, from 0 at +z to pi."""
+    def polar_edges(self) -> Float[np.ndarray, "edges"]:
+        """(polar + 1,) radians, from 0 at +z to pi."""
         return np.linspace(0.0, np.pi, self.polar + 1)
 
     @property
@@ -69,13 +69,13 @@ class SphereBins:
         return np.array([1, *np.diff(above).tolist(), 1])
 
     @cached_property
-    def cell_starts(self) -> Int[np.ndarray, "m"]:
-        """The first cell of each band, and after the last how many there are."""
+    def cell_starts(self) -> Int[np.ndarray, "edges"]:
+        """(m + 1,) the first cell of each band, and after the last how many there are."""
         return np.concatenate([[0], np.cumsum(self.bands)])
 
     @cached_property
-    def band_edges(self) -> Float[np.ndarray, "m"]:
-        """z of the bands' edges, from 1 down to -1: what lies between two has the area of its cells."""
+    def band_edges(self) -> Float[np.ndarray, "edges"]:
+        """(m + 1,) z of the bands' edges, from 1 down to -1: what lies between two has the area of its cells."""
         return 1.0 - 2.0 * self.cell_starts / self.cells
 
     @cached_property
@@ -123,7 +123,7 @@ class SphereBins:
         return angles, cells
 
 
-def _first_bands(edges: Float[np.ndarray, "m"]) -> Int[np.ndarray, "s"]:
+def _first_bands(edges: Float[np.ndarray, "edges"]) -> Int[np.ndarray, "s"]:
     """For each of many equal slices of z from 1 downward, the band at its upper end: where a search begins."""
     bands = len(edges) - 1
     z = 1.0 - 2.0 * np.arange(8 * bands) / (8 * bands)

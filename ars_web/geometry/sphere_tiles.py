@@ -28,7 +28,7 @@ class Tiles:
     owners: Int[np.ndarray, "v"]
 
 
-def bin_patches(bins: SphereBins) -> Float[np.ndarray, "b 4"]:
+def bin_patches(bins: SphereBins) -> Float[np.ndarray, "k 4"]:
     """Azimuth from and to, polar angle from and to, of each bin of equal angles, azimuth * polar bins + polar."""
     azimuth, polar = np.divmod(np.arange(bins.cells), bins.polar)
     around, down = bins.azimuth_edges, bins.polar_edges
@@ -51,11 +51,14 @@ def patch_middles(patches: Float[np.ndarray, "k 4"]) -> Float[np.ndarray, "k 3"]
 
 
 @lru_cache(maxsize=32)
-def stand_ins(bins: SphereBins, symmetry: Symmetry = NO_SYMMETRY) -> tuple[np.ndarray, np.ndarray]:
-    """For each bin of equal angles (b,) and each cell (k,) the one that its middle is folded into by the symmetry:
+def stand_ins(bins: SphereBins, symmetry: Symmetry = NO_SYMMETRY) -> tuple[Int[np.ndarray, "k"], Int[np.ndarray, "k"]]:
+    """For each bin of equal angles (k,) and each cell (k,) the one that its middle is folded into by the symmetry:
     whose views are views from there, too."""
     middles = patch_middles(bin_patches(bins)), bins.cell_directions
-    return bins.of(folded(middles[0], symmetry))[0], bins.of(folded(middles[1], symmetry))[1]
+    found = bins.of(folded(middles[0], symmetry))[0], bins.of(folded(middles[1], symmetry))[1]
+    for one in found:
+        one.flags.writeable = False
+    return found
 
 
 def tiles(patches: Float[np.ndarray, "k 4"], *, gap: float) -> Tiles:

@@ -3,7 +3,7 @@
 from functools import lru_cache
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from ars_web.geometry import sphere_kernels
 from ars_web.geometry.box import Box
@@ -61,8 +61,8 @@ def folded(directions: Float[np.ndarray, "n 3"], symmetry: Symmetry) -> Float[np
 
 
 @lru_cache(maxsize=64)
-def reachable(bins: SphereBins, symmetry: Symmetry) -> tuple[np.ndarray, np.ndarray]:
-    """Which bins (azimuth * polar,) and which cells (k,) folded directions can lie in; all of them without symmetry."""
+def reachable(bins: SphereBins, symmetry: Symmetry) -> tuple[Bool[np.ndarray, "k"], Bool[np.ndarray, "k"]]:
+    """Which bins of equal angles and which cells folded directions can lie in; all of them without symmetry."""
     found = np.ones(bins.cells, dtype=bool), np.ones(bins.cells, dtype=bool)
     if symmetry.kind != "none":
         for reached, places in zip(found, bins.of(folded(evenly_over_sphere(DENSE), symmetry)), strict=True):

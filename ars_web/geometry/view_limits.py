@@ -75,7 +75,9 @@ def check_range(name: LimitName, limits: Range) -> None:
         raise BadInput(f"a distance must be more than 0 m, not {low:g} to {high:g}")
 
 
-def looking_at(eyes_world: Float[np.ndarray, "m 3"], targets_world: Float[np.ndarray, "m 3"]) -> np.ndarray:
+def looking_at(
+    eyes_world: Float[np.ndarray, "m 3"], targets_world: Float[np.ndarray, "m 3"]
+) -> Float[np.ndarray, "m 4 4"]:
     """`Ts_world_camera` (m, 4, 4) of upright cameras that have their targets on their axes.
 
     The image's x is horizontal and the world's z points up in the image. Looking straight up or down, the image's x

@@ -16,6 +16,7 @@ import math
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 import trimesh
@@ -28,7 +29,7 @@ from ars_web.errors import ArsError
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box
 from ars_web.geometry.sphere_bins import SphereBins
-from ars_web.geometry.sphere_tiles import bin_patches, cell_patches, dots, outlines, stand_ins, tiles
+from ars_web.geometry.sphere_tiles import Tiles, bin_patches, cell_patches, dots, outlines, stand_ins, tiles
 from ars_web.geometry.symmetry import Symmetry
 from ars_web.geometry.view_directions import folded
 from ars_web.scene.boxes import BoxNodes
@@ -93,7 +94,7 @@ def heat_colors(counts: Int[np.ndarray, "k"]) -> UInt8[np.ndarray, "k 3"]:
 
 def sphere_glb(bins: SphereBins, counts: Int[np.ndarray, "k"], *, dark: bool) -> bytes:
     """The unit sphere's cells with their colours, holes with a dot, as binary glTF."""
-    cells = tiles(cell_patches(bins), gap=GAP)
+    cells = _cell_tiles(bins)
     holes = np.flatnonzero(counts == 0)
     spots = dots(bins.cell_directions[holes], radius=min(DOT, 0.4 / math.sqrt(bins.cells)))
     rgb = heat_colors(counts)
@@ -112,6 +113,12 @@ def sphere_glb(bins: SphereBins, counts: Int[np.ndarray, "k"], *, dark: bool) ->
     made = mesh.export(file_type="glb")
     assert isinstance(made, bytes)
     return made
+
+
+@lru_cache(maxsize=4)
+def _cell_tiles(bins: SphereBins) -> Tiles:
+    """The cells, which are made on the event loop: kept, since every other count and colour has the same."""
+    return tiles(cell_patches(bins), gap=GAP)
 
 
 def _linear(rgb: UInt8[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3"]:
@@ -163,10 +170,10 @@ class CoverageSphere:
     def meets(self, ray: Ray) -> SphereHit | None:
         """Where a ray meets the sphere first, or, from within, at all; None: nowhere, or there is no sphere."""
         with self._lock:
-            sight, found = self._sight, self._found
-            box = None if sight is None else self._boxes.box(sight.box_id)
-        if sight is None or box is None or found is None:
+            shown = self._shown()
+        if shown is None:
             return None
+        sight, box, found = shown
         offset = ray.origin - box.T_world_box[:3, 3]
         along, radius = float(offset @ ray.direction), _radius(box)
         reach = along**2 - float(offset @ offset) + radius**2
@@ -192,9 +199,9 @@ class CoverageSphere:
         return [self._reading]
 
     def _wanted(self) -> tuple[CoverageSight, int] | None:
-        """What is to be counted: the sight without what is only outlined."""
+        """What is to be counted, of the session after how many edits."""
         sight = self._sight
-        return None if sight is None else (replace(sight, chosen_bin=None, chosen_cell=None), self._turn)
+        return None if sight is None else (_counted(sight), self._turn)
 
     async def _read_on(self) -> None:
         """Read until what is known is what is wanted; of what was wanted meanwhile only the last."""
@@ -220,21 +227,24 @@ class CoverageSphere:
         with self._lock:
             if self._closed or is_gone(self._client):
                 return
-            sight, found, known = self._sight, self._found, self._known
-            box = None if sight is None else self._boxes.box(sight.box_id)
-            # Counts of the same bins are shown until newer ones are there; those of other objects are not.
-            current = (
-                sight is not None
-                and known is not None
-                and known[0] == replace(sight, chosen_bin=None, chosen_cell=None)
-            )
+            shown = self._shown()
             with self._client.atomic():
-                if sight is None or box is None or found is None or not current:
-                    if self._at is not None:
-                        self._at.visible = False
-                else:
-                    self._draw_sphere(sight, box, found)
+                if shown is not None:
+                    self._draw_sphere(*shown)
+                elif self._at is not None:
+                    self._at.visible = False
             self._client.flush()
+
+    def _shown(self) -> tuple[CoverageSight, Box, SphereCounts] | None:
+        """What is drawn, or None. Call it with the lock.
+
+        Counts of the same bins are shown until newer ones are there; those of other objects are not.
+        """
+        sight, found, known = self._sight, self._found, self._known
+        box = None if sight is None else self._boxes.box(sight.box_id)
+        if sight is None or box is None or found is None or known is None or known[0] != _counted(sight):
+            return None
+        return sight, box, found
 
     def _draw_sphere(self, sight: CoverageSight, box: Box, found: SphereCounts) -> None:
         scene, radius = self._client.scene, _radius(box)
@@ -286,6 +296,11 @@ def chosen_lines(sight: CoverageSight, symmetry: Symmetry) -> Float[np.ndarray, 
     alike = np.flatnonzero(stand_in == chosen)
     # One that is cut by the edge of what directions are folded to may stand for no whole one.
     return 1.006 * outlines(patches[alike if len(alike) else [chosen]])
+
+
+def _counted(sight: CoverageSight) -> CoverageSight:
+    """The sight without what is only outlined."""
+    return replace(sight, chosen_bin=None, chosen_cell=None)
 
 
 def _equal(a: SphereCounts, b: SphereCounts) -> bool:

@@ -4,7 +4,6 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
@@ -13,7 +12,7 @@ from ars_web.datasets.coverage import SessionViews, coverage_of
 from ars_web.datasets.options import ExportOptions
 from ars_web.datasets.samples import kept, labels_in_frames
 from ars_web.datasets.shapes import meshes_of
-from ars_web.errors import BadFile, BadInput, NotFound, RefusedPath
+from ars_web.errors import BadInput, NotFound
 from ars_web.geometry.box import Box
 from ars_web.geometry.rigid_transform import Transform
 from ars_web.geometry.sphere_bins import SphereBins
@@ -38,7 +37,6 @@ from ars_web.geometry.view_proposals import (
     propose_views,
 )
 from ars_web.geometry.view_tour import camera_turns, tour
-from ars_web.recordings.hand_eye import recorded_hand_eye
 from ars_web.sessions.model import SessionSnapshot
 
 WIDENED = 0.1
@@ -282,22 +280,6 @@ def plan_tour(snapshot: SessionSnapshot, views: SessionViews, rows: Sequence[int
         empty=sum(int(one.wanted.sum()) for one in wanted),
         left=tuple(CellLeft(views.box_ids[place], cell, reason) for place, cell, reason in found.left),
     )
-
-
-@dataclass(frozen=True, eq=False)
-class RecordedWrist:
-    """How a wrist held the camera of a recording, or why nobody knows; one of the two is None."""
-
-    T_wrist_camera: Transform | None
-    unknown: str | None
-
-
-def recorded_wrist(format: str, source: Path) -> RecordedWrist:  # noqa: A002 - as the registry calls it
-    """What the recording says that a session was made from, if it is still where it was."""
-    try:
-        return RecordedWrist(recorded_hand_eye(format, source), None)
-    except (NotFound, BadFile, RefusedPath) as error:
-        return RecordedWrist(None, str(error))
 
 
 def _limits(snapshot: SessionSnapshot, views: SessionViews, rows: Sequence[int], request: TourRequest) -> ViewLimits:

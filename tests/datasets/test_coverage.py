@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -138,3 +139,37 @@ def test_objects_that_are_not_there_are_named(make_snapshot: Make) -> None:
         chosen_boxes(snapshot, class_id=0, box_id=1)
     with pytest.raises(NotFound, match="no box yet"):
         chosen_boxes(make_snapshot(2, sid="s3", objects=[]))
+
+
+def test_a_camera_at_the_centre_of_a_box_sees_it_from_no_direction(make_snapshot: Make) -> None:
+    T_world_box = np.eye(4)
+    T_world_box[:3, 3] = make_snapshot(30).frames.Ts_world_camera[4, :3, 3]
+    snapshot = make_snapshot(30, objects=[Box(T_world_box, np.full(3, 0.1))])
+    views = session_views(snapshot, PLAIN)
+    assert views.counted[0, 4]
+    assert np.isnan(views.directions[0, 4]).all()
+    found = coverage_of(views, BINS, [0])
+    assert found.counts.sum() == found.cell_counts.sum() == found.views - 1
+
+
+def test_of_objects_with_other_symmetries_all_that_any_can_be_seen_from_is_reachable(make_snapshot: Make) -> None:
+    half, quarter = (Symmetry("discrete", (((0.0, 0.0, 1.0), order),)) for order in (2, 4))
+    views = session_views(make_snapshot(30, symmetries={0: half, 1: quarter}), PLAIN)
+    for rows in ([0, 1, 2], [1, 0], [2, 1]):
+        found = coverage_of(views, BINS, rows)
+        assert np.flatnonzero(found.reachable.any(axis=1)).tolist() == list(range(18, 36))
+        alone = coverage_of(views, BINS, [0])
+        assert (found.cells_reachable == alone.cells_reachable).all()
+    assert coverage_of(views, BINS, [1]).reachable.sum() == 9 * 18
+
+
+def test_a_view_lies_in_a_bin_that_can_be_reached_whatever_is_rounded(make_snapshot: Make) -> None:
+    views = session_views(make_snapshot(4, objects=[Box(np.eye(4), np.full(3, 0.1))]), PLAIN)
+    quarter = Symmetry("discrete", (((0.0, 0.0, 1.0), 4),))
+    # A hair below the azimuth of 0 that folding leads to, as rounding may put it.
+    edge = np.tile([1.0, -1e-12, 0.3], (1, 4, 1))
+    rounded = replace(views, symmetries=(quarter,), directions=edge, counted=np.ones((1, 4), dtype=bool))
+    found = coverage_of(rounded, BINS, [0])
+    assert found.counts[17].sum() == 4
+    assert found.reachable[found.counts > 0].all()
+    assert found.cells_reachable[found.cell_counts > 0].all()

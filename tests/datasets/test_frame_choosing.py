@@ -17,6 +17,7 @@ from ars_web.datasets.plan_files import digest_of
 from ars_web.datasets.planned import ExportPlan
 from ars_web.datasets.splits import SPLITS
 from ars_web.errors import BadInput, NotFound
+from ars_web.geometry import camera as geometry_camera
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box
 from ars_web.geometry.even_spacing import evenly
@@ -283,3 +284,44 @@ def test_a_split_that_gets_no_frame_is_told(lopsided: SessionSnapshot, tmp_path:
 def test_what_cannot_be_or_would_be_ignored_is_refused(changes: dict[str, object], said: str) -> None:
     with pytest.raises(ValidationError, match=said):
         options(**changes)
+
+
+def test_twins_of_a_choice_are_counted_and_distances_part_them(make_snapshot: Make, tmp_path: Path) -> None:
+    # Each direction twice, the second time from four fifths as far.
+    snapshot = standing(make_snapshot(24, objects=CUBE, one_camera=True), np.repeat(np.arange(12) * 30.0, 2))
+    apart = snapshot.frames.Ts_world_camera.copy()
+    apart[1::2, :3, 3] *= 0.8
+    nearer = replace(snapshot, frames=replace(snapshot.frames, Ts_world_camera=apart))
+    for session, twins in ((snapshot, 12), (nearer, 0)):
+        made = plan_of(session, out=tmp_path / "d", frames={"near_degrees": 3.0}).choice
+        assert made is not None
+        assert (made.near_twins, made.chosen) == (twins, 24 - twins)
+    made = plan_of(snapshot, out=tmp_path / "d", frames={"near_degrees": 3.0, "count": 5}).choice
+    assert made is not None
+    assert (made.near_twins, made.chosen) == (5, 5)
+
+
+def test_frames_are_chosen_by_the_images_as_they_are_written(make_snapshot: Make) -> None:
+    """The first camera's lens bends: a box at the border is cut more, or less, in its rectified image."""
+    snapshot = make_snapshot(24)
+    flat = replace(snapshot, cameras={i: geometry_camera.rectified(one) for i, one in snapshot.cameras.items()})
+    differ = 0
+    for cut in (0.0, 0.05, 0.1, 0.3, 0.5):
+        choice = {"frames": {"count": 24}, "max_truncated": cut}
+        (_, as_taken), (_, expected) = (choose_frames([one], options(**choice)) for one in (snapshot, flat))
+        _, rectified = choose_frames([snapshot], options(**choice, images="rectify"))
+        assert rectified == expected
+        differ += expected != as_taken
+    assert differ
+
+
+def test_a_camera_at_the_centre_of_a_box_adds_no_direction(make_snapshot: Make, tmp_path: Path) -> None:
+    T_world_box = np.eye(4)
+    T_world_box[:3, 3] = make_snapshot(30).frames.Ts_world_camera[4, :3, 3]
+    snapshot = make_snapshot(30, objects=[*CUBE, Box(T_world_box, np.full(3, 0.1))])
+    views = session_views(snapshot, options())
+    elements = directions_in_frames(views)
+    assert views.counted[1, 4]
+    assert elements[4, 1] == NOTHING
+    assert set(np.unique(elements[:, 1])) <= {NOTHING, *range(648, 2 * 648)}
+    assert forecast(plan_of(snapshot, out=tmp_path / "d")).directions.all == covered(elements)

@@ -115,3 +115,17 @@ def test_sectors_of_few_frames() -> None:
     assert by_sector([10.0]) == [0]
     assert sorted(by_sector([10.0, 200.0, float("nan")])) == [0, 1, 2]
     assert by_sector([5.0, 6.0], train=0.0, val=1.0, test=0.0) == [1, 1]
+
+
+def test_a_held_out_run_may_be_at_either_end_of_the_order() -> None:
+    azimuths = [0.0, 10.0, 20.0, 30.0]
+    runs_begin = {by_sector(azimuths, seed=seed).index(1) for seed in range(40)}
+    assert runs_begin == {0, 1, 2}, "of val and test, a frame each, val begins at any of three places"
+
+
+def test_a_share_that_means_a_whole_number_gets_it_and_ties_go_to_the_first() -> None:
+    # 0.29 * 100 is 28.999999999999996.
+    assert apportion(100, [0.71, 0.29]) == [71, 29]
+    assert apportion(10, [0.7, 0.1, 0.2]) == [7, 1, 2]
+    assert apportion(5, [0.5, 0.5]) == [3, 2]
+    assert apportion(5, [0.1, 0.45, 0.45]) == [1, 2, 2]

@@ -84,7 +84,7 @@ def dense_greedy(views: FrameViews, count: int, near: Nearness) -> list[int]:
 
 @settings(max_examples=20, deadline=None)
 @given(
-    seed=st.integers(0, 10_000), near=st.sampled_from([NO_TWINS, Nearness(20.0, 0), Nearness(0.0, 2), Nearness(9, 1)])
+    seed=st.integers(0, 10_000), near=st.sampled_from([NO_TWINS, Nearness(20.0, 0), Nearness(0.0, 2), Nearness(9.0, 1)])
 )
 def test_the_lazy_choice_is_the_dense_one(seed: int, near: Nearness) -> None:
     views = random_views(seed, n=24 + seed % 17, b=1 + seed % 4, cells=12)

@@ -23,12 +23,12 @@ def test_azimuths_count_from_x_over_y_seen_from_above() -> None:
 @pytest.mark.parametrize(
     ("start", "stop", "inside"),
     [
-        (0, 180, [0, 90, 179]),
-        (180, 360, [180, 270, 359]),
-        (270, 90, [270, 359, 0]),
-        (-90, 90, [270, 359, 0]),
-        (-10, 1, [359, 0]),
-        (90, 90.5, [90]),
+        (0.0, 180.0, [0, 90, 179]),
+        (180.0, 360.0, [180, 270, 359]),
+        (270.0, 90.0, [270, 359, 0]),
+        (-90.0, 90.0, [270, 359, 0]),
+        (-10.0, 1.0, [359, 0]),
+        (90.0, 90.5, [90]),
     ],
 )
 def test_a_sector_begins_where_it_says_and_ends_before(start: float, stop: float, inside: list[float]) -> None:
@@ -38,14 +38,15 @@ def test_a_sector_begins_where_it_says_and_ends_before(start: float, stop: float
 
 def test_a_whole_turn_has_all_and_none_has_nothing() -> None:
     azimuths = np.array([0.0, 123.0, np.nan])
-    assert in_sector(azimuths, start=0, stop=360).all()
-    assert in_sector(azimuths, start=-90, stop=270).all()
-    assert not in_sector(azimuths, start=30, stop=30).any()
+    assert in_sector(azimuths, start=0.0, stop=360.0).all()
+    assert in_sector(azimuths, start=-90.0, stop=270.0).all()
+    assert not in_sector(azimuths, start=30.0, stop=30.0).any()
 
 
 def test_every_camera_is_on_one_side_of_an_edge() -> None:
     turn = np.radians(np.arange(0.0, 360.0, 7.5))
     azimuths = azimuths_round(np.column_stack([np.cos(turn), np.sin(turn), turn]), np.eye(4))
+    assert azimuths.tolist() == np.arange(0.0, 360.0, 7.5).tolist(), "whole gaps between them are equally wide, too"
     for edge in (0.0, 7.5, 45.0, 187.5):
         one, other = (in_sector(azimuths, start=edge + a, stop=edge + a + 180.0) for a in (0.0, 180.0))
         assert (one ^ other).all()

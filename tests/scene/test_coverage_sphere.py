@@ -4,6 +4,7 @@ import dataclasses
 import json
 import queue
 import re
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -13,11 +14,12 @@ import pytest
 
 from ars_web.geometry.sphere_bins import SphereBins
 from ars_web.geometry.symmetry import Symmetry
-from ars_web.scene import coverage_sphere
+from ars_web.scene import coverage_sphere, session_scene
 from ars_web.scene.coverage_sphere import chosen_lines, heat_colors, sphere_glb
 from ars_web.scene.server import SceneServers
 from ars_web.sessions.editing import SessionEditor
 from ars_web.sessions.store import SessionStore
+from ars_web.studies.sphere_counts import SphereCounts
 from ars_web.workspace import CoverageSight, DirectionPicked, Picked, ProposedCamera, ViewEvent, ViewState
 
 VIEW = "a" * 32
@@ -84,6 +86,8 @@ def test_cells_have_the_colours_of_their_counts_and_holes_a_dot() -> None:
         assert len({colors[cell] for cell in range(BINS.cells) if counts[cell] == 0}) == 1
         assert colors[3] != colors[0]
         assert colors[40][3] > colors[0][3]  # what is seen is less transparent
+        assert len({tuple(color[:3]) for color in colors}) == 4
+    assert of_cells(sphere_glb(BINS, counts, dark=True))[0][0] != of_cells(sphere_glb(BINS, counts, dark=False))[0][0]
     assert of_cells(sphere_glb(BINS, counts + 1, dark=True))[1] == 0
 
 
@@ -122,6 +126,15 @@ def test_the_sphere_stands_round_the_box_and_is_drawn_anew_only_for_another_coun
     visitor.listen_until(lambda v: v.nodes["/coverage"]["visible"] is False)
 
 
+def test_in_the_other_theme_holes_have_its_colours(visitor: Any, scenes: SceneServers, sid: str) -> None:
+    was = mesh_of(visitor)
+    scenes.show(sid, VIEW, ViewState(coverage=SIGHT, dark=not ViewState().dark))
+    visitor.listen_until(lambda v: mesh_of(v) != was)
+    before, after = of_cells(was)[0], of_cells(mesh_of(visitor))[0]
+    hole = min(after, key=lambda color: color[3])
+    assert hole not in before
+
+
 def test_a_click_on_the_sphere_is_a_direction_and_beside_it_is_not(
     visitor: Any, store: SessionStore, sid: str, events: "queue.Queue[ViewEvent]"
 ) -> None:
@@ -136,6 +149,36 @@ def test_a_click_on_the_sphere_is_a_direction_and_beside_it_is_not(
     assert events.get(timeout=20) == DirectionPicked(int(angles[0]), int(cells[0]))
     visitor.click(centre + 5.0, centre + np.array([9.0, 5.0, 5.0]))
     assert events.get(timeout=20) == Picked()
+
+
+def test_until_another_sphere_is_counted_there_is_none_to_click(
+    visitor: Any,
+    scenes: SceneServers,
+    store: SessionStore,
+    sid: str,
+    events: "queue.Queue[ViewEvent]",
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    counted, go = session_scene.sphere_counts, threading.Event()
+
+    def slow(*given: Any, **more: Any) -> SphereCounts:
+        assert go.wait(20)
+        return counted(*given, **more)
+
+    monkeypatch.setattr(session_scene, "sphere_counts", slow)
+    box = store.state(sid).boxes[1].box
+    centre = box.T_world_box[:3, 3]
+    eye = centre + 3.0 * box.T_world_box[:3, :3] @ np.array([0.3, -0.5, 0.6])
+    few = SphereBins(6, 3)
+    scenes.show(sid, VIEW, ViewState(coverage=dataclasses.replace(SIGHT, azimuth_bins=6, polar_bins=3)))
+    visitor.listen_until(lambda v: v.nodes["/coverage"]["visible"] is False)
+    visitor.click(eye, centre)
+    assert isinstance(events.get(timeout=20), Picked)
+    go.set()
+    visitor.listen_until(lambda v: v.nodes["/coverage"]["visible"] is True)
+    visitor.click(eye, centre)
+    angles, cells = few.of(np.array([[0.3, -0.5, 0.6]]))
+    assert events.get(timeout=20) == DirectionPicked(int(angles[0]), int(cells[0]))
 
 
 def test_a_box_that_is_not_there_has_no_sphere(

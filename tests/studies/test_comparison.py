@@ -1,6 +1,7 @@
 """The annotation study on a scene of three boxes whose rectangles are worked by hand."""
 
 import json
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +12,7 @@ import pytest
 
 from ars_web.annotations.foreign import ForeignImage, ForeignLabels, ForeignOutline, ForeignPose, ForeignRectangle
 from ars_web.annotations.registry import read_labels
+from ars_web.datasets.drawing import Color, color_of
 from ars_web.datasets.jobs import plan_export, run_export
 from ars_web.datasets.options import ExportOptions
 from ars_web.errors import BadFile, BadInput
@@ -18,9 +20,14 @@ from ars_web.geometry.box import Box
 from ars_web.geometry.camera import Camera
 from ars_web.geometry.polygon import Polygon
 from ars_web.sessions.model import FrameTable, ObjectClass, SessionSnapshot, SessionState, VirtualBox
-from ars_web.studies.agreement import Agreement, Confusion
+from ars_web.studies import comparison_pictures
+from ars_web.studies.agreement import Agreement, Confusion, Matches, Offsets, RectangleAgreement
+from ars_web.studies.compared_frames import Sides
 from ars_web.studies.comparison import Comparison, compare
 from ars_web.studies.comparison_report import comparison_page, offset_rows
+from ars_web.studies.comparison_warnings import comparison_warnings
+from ars_web.studies.hidden_bands import HiddenBand, hidden_bands
+from ars_web.studies.rectangle_matching import Pairs, Rectangles
 
 CAMERA = Camera(200, 200, 100.0, 100.0, 99.5, 99.5)
 """A point at X, Y, Z lies at 100 + 100 X / Z, 100 + 100 Y / Z in image coordinates."""
@@ -387,3 +394,78 @@ def test_the_same_labels_give_the_same_numbers_in_any_order(make_session: Callab
     assert first.rectangles == second.rectangles
     assert first.frames == second.frames
     assert json.dumps(first.bands, default=vars) == json.dumps(second.bands, default=vars)
+
+
+def test_a_label_that_is_hidden_wholly_counts_only_where_its_class_is_compared(
+    make_session: Callable[..., SessionSnapshot],
+) -> None:
+    behind = ("plate", box((-0.5, 0.5), (-0.5, 0.5), (14, 15)))
+    found = study(make_session(objects=(*OBJECTS[:1], behind)), by_hand({"a.png": [("cup", CUP)]}))
+    assert (found.hidden, [one.class_name for one in found.never_by_hand]) == (0, ["plate"])
+    # What is too much of a class that nobody labelled is in no number.
+    assert [one for one in found.rectangles["in_image"].confusion if one.automatic == "plate"] == []
+
+
+def test_a_share_on_a_band_s_border_belongs_to_the_better_seen_band() -> None:
+    rows = np.arange(5)
+    bbox = np.tile([0.0, 0.0, 4.0, 4.0], (5, 1))
+    rectangles = Rectangles(rows, np.zeros(5, dtype=np.int64), bbox)
+    none = np.zeros(0, dtype=np.int64)
+    found = Matches(Pairs(rows, rows, np.linspace(0.5, 0.9, 5)), Pairs(none, none, np.zeros(0)))
+    every = np.ones(5, dtype=bool)
+    sides = Sides(rectangles, rectangles, bbox, found, every, every, ("cup",))
+    bands = hidden_bands(sides, np.array([0.0, 0.5, 0.75, 0.95, 1.0]))
+    assert [band.matched for band in bands] == [2, 1, 1, 1]
+    assert [band.in_image for band in bands] == pytest.approx([0.85, 0.7, 0.6, 0.5])
+    assert [band.visible for band in bands] == [1.0] * 4
+
+
+def offsets(left: float, top: float, right: float, bottom: float) -> list[str]:
+    """What is said of so much between all sides."""
+    total = Agreement(100, 100, 100, 1.0, 1.0, 0.9, 0.9)
+    agreement = RectangleAgreement(total, (), (), (), Offsets(left, top, right, bottom))
+    return list(comparison_warnings(agreement, (HiddenBand(0.95, 1.0, 100, 0.9, 0.9),), (), ()))
+
+
+def test_only_what_moves_both_sides_one_way_is_a_shift() -> None:
+    assert offsets(0.39, 0.39, 0.39, 0.39) == []
+    assert offsets(-2.0, -2.0, 2.0, 2.0) == [], "wider is not moved"
+    (right,) = offsets(0.4, 0.0, 1.0, 0.0)
+    assert "0.7 px further right" in right
+    (up,) = offsets(0.0, -0.6, 0.0, -0.4)
+    assert "0.5 px further up" in up
+    # Moved to the right by as much as VOC's counting would, but the right side too.
+    (moved,) = offsets(1.0, 1.0, 1.0, 0.3)
+    assert "further right" in moved
+    (counted,) = offsets(1.0, 0.8, 0.3, -0.3)
+    assert "begin 0.8 px further left and up" in counted
+
+
+def test_what_is_seen_is_drawn_only_where_something_hides_and_strangers_are_not_lonely(
+    make_session: Callable[..., SessionSnapshot], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session, drawn, said = make_session(), list[tuple[list[np.ndarray], object, float]](), list[str]()
+
+    class Recorded(comparison_pictures.Canvas):
+        def lines(self, lines: list[np.ndarray], color: Color, *, width: float) -> None:
+            drawn.append((lines, color, width))
+
+        def tag(self, bbox: object, name: str, word: str, color: object) -> None:
+            said.append(f"{name}: {word}")
+
+    monkeypatch.setattr(comparison_pictures, "Canvas", Recorded)
+    labels = {"a.png": [("plate", PLATE), ("cup", [70, 90, 90, 110]), ("dish", [20, 20, 60, 40])]}
+    (worst,) = study(session, by_hand(labels)).worst
+    assert comparison_pictures.picture(session, worst).startswith(b"\xff\xd8")
+    # The cup hides the plate; the two cups are seen whole.
+    dashed = [lines for lines, *_ in drawn if len(lines) > 1]
+    assert len(dashed) == 1
+    ends = np.concatenate(dashed[0])
+    assert [*ends.min(axis=0), *ends.max(axis=0)] == pytest.approx([110, 90, 135, 110])
+    by_color = Counter((color, width) for lines, color, width in drawn if len(lines) == 1)
+    manual, automatic, lonely = (
+        color_of(one) for one in (comparison_pictures.MANUAL, comparison_pictures.AUTOMATIC, comparison_pictures.LONELY)
+    )
+    # A pair of plates; a cup by hand and two by the program that have no partner; the dish is not compared.
+    assert by_color == {(manual, 2.0): 1, (automatic, 2.0): 1, (lonely, 2.0): 3, (manual, 1.0): 1}
+    assert sorted(said) == ["cup: hand alone", "cup: program alone", "cup: program alone"]

@@ -69,3 +69,9 @@ def test_nothing_has_no_partner() -> None:
     some = rectangles([0], [0], [[0, 0, 1, 1]])
     for pair in ((none, none), (none, some), (some, none)):
         assert told(matched_pairs(*pair, iou=0.3)) == []
+
+
+def test_an_overlap_of_just_the_threshold_is_a_pair() -> None:
+    first, second = (rectangles([0], [0], [box]) for box in ([0, 0, 10, 10], [0, 0, 10, 5]))
+    assert told(matched_pairs(first, second, iou=0.5)) == [(0, 0, 0.5)]
+    assert told(matched_pairs(first, second, iou=0.501)) == []

@@ -272,3 +272,33 @@ def test_frames_divided_one_by_one_are_told_to_go_in_runs() -> None:
     (said,) = warnings_of(whole(options=options)(of_val(twins=180)(well())))
     assert isinstance(said, ReportWarning)
     assert said.command == "--split-by block"
+
+
+def test_little_is_not_nothing_and_nearly_all_is_not_all() -> None:
+    seldom = next(one for one in warnings_of(of_box(labels=9)(well())) if one.kind == "seldom_labelled")
+    assert seldom.says.endswith("in 9 of 1000 frames (under 1 %)")
+    never = next(one for one in warnings_of(of_box(labels=0)(well())) if one.kind == "seldom_labelled")
+    assert never.says.endswith("in 0 of 1000 frames (0 %)")
+    negatives = next(one for one in warnings_of(frames(negatives=999)(well())) if one.kind == "many_negatives")
+    assert "(over 99 %)" in negatives.says
+
+
+def test_a_class_that_does_not_train_is_graver_than_one_that_is_not_measured() -> None:
+    def of_split(name: str) -> Change:
+        def change(report: SessionReport) -> SessionReport:
+            counts = report.splits[name].counts.model_copy(update={"classes": {"cup": 100, "pan": 0}})
+            changed = report.splits[name].model_copy(update={"counts": counts})
+            return report.model_copy(update={"splits": {**report.splits, name: changed}})
+
+        return change
+
+    for name, grave in (("train", True), ("val", False)):
+        (found,) = warnings_of(of_split(name)(well()))
+        assert (found.kind, found.grave) == ("class_not_in_split", grave)
+
+
+def test_where_nothing_is_labelled_that_is_said_once_and_not_of_each_class() -> None:
+    nothing = whole(labels=0, classes=[one.model_copy(update={"labels": 0, "sizes": None}) for one in well().classes])
+    found = kinds(nothing(well()))
+    assert "no_labels" in found
+    assert "never_labelled" not in found

@@ -20,7 +20,18 @@ from ars_web.errors import BadInput
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.box import Box
 from ars_web.geometry.camera import Camera
-from ars_web.sessions.model import FrameTable, ObjectClass, SessionSnapshot, SessionState, SessionSummary, VirtualBox
+from ars_web.geometry.polygon import Polygon
+from ars_web.sessions.model import (
+    FrameTable,
+    Mask,
+    ObjectClass,
+    SessionSnapshot,
+    SessionState,
+    SessionSummary,
+    VirtualBox,
+)
+from ars_web.studies import planned_labels, session_study
+from ars_web.studies import session_report as session_reports
 from ars_web.studies.report_facts import SessionReport
 from ars_web.studies.report_page import session_page
 from ars_web.studies.session_report import session_report
@@ -267,3 +278,69 @@ def test_what_no_export_could_be_is_refused(tmp_path: Path) -> None:
     ):
         with pytest.raises(BadInput, match=says):
             looked_at(make(tmp_path), **given)
+
+
+def test_distances_and_neighbours_are_of_what_is_labelled(tmp_path: Path) -> None:
+    snapshot = make(tmp_path, 60)
+    study, report = looked_at(snapshot, min_area_px=60.0, split={"train": 0.5, "val": 0.5, "by": "frame"})
+    centres = snapshot.frames.Ts_world_camera[:, :3, 3]
+    boxes = np.array([box.box.T_world_box[:3, 3] for _, box in sorted(snapshot.state.boxes.items())])
+    keep, split = study.labels.keep, study.labels.plan.frames.split
+    away = np.linalg.norm(centres[:, None] - boxes, axis=2)
+    assert study.distances == pytest.approx(np.where(keep, away, np.inf).min(axis=1))
+    assert np.isinf(study.distances).any()
+    labelled = keep.any(axis=1)
+    near = study.neighbours["val"]
+    assert near.rows.tolist() == np.flatnonzero(labelled & (split == 1)).tolist()
+    assert (labelled & (split == 0))[near.nearest].all()
+    told = report.splits["val"].neighbours
+    assert told is not None
+    rotations = snapshot.frames.Ts_world_camera[:, :3, :3]
+    between = rotations[near.rows].transpose(0, 2, 1) @ rotations[near.nearest]
+    turns = np.degrees(np.arccos(np.clip((np.trace(between, axis1=1, axis2=2) - 1) / 2, -1, 1)))
+    assert told.median_turn == pytest.approx(np.median(turns), abs=1e-4)
+    moves = np.linalg.norm(centres[near.rows] - centres[near.nearest], axis=1) / study.distances[near.rows]
+    assert told.median_move == pytest.approx(np.median(moves), abs=1e-6)
+    assert report.splits["train"].neighbours is None
+
+
+def test_where_no_labelled_frame_trains_there_is_no_neighbour(tmp_path: Path) -> None:
+    # The last frames look away: all of those that train do.
+    study, _ = looked_at(make(tmp_path), frames={"list": [0, 1, 20, 21, 22, 23]}, split={"train": 0.6, "val": 0.4})
+    split = study.labels.plan.frames.split
+    empty = replace(study.labels, keep=study.labels.keep & (split != 0)[:, None])
+    assert session_study._across_splits(empty, study.distances) == {}
+
+
+def test_sizes_and_shares_on_a_limit_belong_to_what_begins_there() -> None:
+    found = session_reports._sizes(np.array([15.9, 16.0, 31.9, 32.0, 95.9, 96.0], dtype=np.float32))
+    assert found is not None
+    assert (found.tiny, found.small, found.medium, found.large) == (1, 3, 2, 1)
+    assert found.histogram.counts == [0, 0, 1, 1, 1, 1, 0, 1, 1, *[0] * 7]
+    for dtype in (np.float32, np.float64):
+        shares = session_reports._shares(np.arange(11, dtype=dtype) / dtype(10))
+        assert shares is not None
+        assert shares.histogram.counts == [1, 1, 1, 1, 1, 1, 1, 1, 1, 2]
+
+
+def test_masks_that_nobody_accepted_are_not_counted(tmp_path: Path) -> None:
+    snapshot = make(tmp_path)
+    ring = Polygon(np.array([[1.0, 1.0], [5.0, 1.0], [5.0, 5.0]]))
+    masks = {
+        i: Mask(i, 2, frame, 0, (ring,), "smart" if i < 3 else "proposed", i < 3, 1)
+        for i, frame in enumerate((4, 5, 6), start=1)
+    }
+    snapshot = replace(snapshot, state=replace(snapshot.state, masks=masks))
+    _, report = looked_at(snapshot)
+    assert [box.masks for box in report.boxes] == [0, 2, 0, 0]
+
+
+def test_blocks_of_labels_add_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    snapshot = make(tmp_path)
+    given: dict[str, Any] = {"min_visible": 0.6, "max_truncated": 0.3, "min_area_px": 30.0}
+    whole, report = looked_at(snapshot, **given)
+    monkeypatch.setattr(planned_labels, "LABELS_AT_ONCE", 20)
+    parts, of_parts = looked_at(snapshot, **given)
+    assert of_parts == report
+    assert sum(report.dropped.values()) + report.labels == 24 * 4
+    assert np.array_equal(parts.labels.side, whole.labels.side, equal_nan=True)

@@ -8,7 +8,7 @@ import pytest
 
 from ars_web.geometry import rigid_transform
 from ars_web.studies import split_neighbours
-from ars_web.studies.split_neighbours import TWIN_MOVE, TWIN_TURN, neighbours
+from ars_web.studies.split_neighbours import TWIN_MOVE, TWIN_TURN, Neighbours, neighbours
 
 
 def poses(n: int, *, seed: int = 0, at: float = 0.0) -> np.ndarray:
@@ -54,3 +54,19 @@ def test_a_twin_is_near_and_looks_the_same_way() -> None:
     assert found.twins.tolist() == [True, False, True, False, False]
     assert np.degrees(found.turn).round(6).tolist() == [4.0, 6.0, 0.0, 0.0, 180.0]
     assert found.move.round(6).tolist() == [0.0, 0.0, 0.045, 0.055, 0.0]
+
+
+def test_a_turn_past_half_a_turn_is_the_shorter_way_round() -> None:
+    T = np.eye(4)
+    # Quaternions of 179 and 181 degrees point nearly opposite ways.
+    Ts = np.stack([turned(T, 181.0), turned(T, 179.0), turned(T, 0.0)])
+    found = neighbours(Ts, np.full(3, 1.0), np.array([0]), np.array([1, 2]))
+    assert found.nearest.tolist() == [1]
+    assert np.degrees(found.turn) == pytest.approx([2.0], abs=1e-6)
+    assert found.twins.tolist() == [True]
+
+
+def test_at_the_limits_frames_are_no_twins() -> None:
+    rows, none = np.arange(3), np.zeros(3, dtype=np.int64)
+    move, turn = np.array([TWIN_MOVE, 0.9 * TWIN_MOVE, 0.0]), np.array([0.0, TWIN_TURN, 0.9 * TWIN_TURN])
+    assert Neighbours(rows, none, move, turn).twins.tolist() == [False, False, True]

@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,11 @@ from ars_web.errors import BadInput, NotFound
 from ars_web.geometry import rigid_transform
 from ars_web.geometry.sphere_bins import SphereBins
 from ars_web.geometry.symmetry import NO_SYMMETRY, Symmetry
+from ars_web.geometry.view_limits import ViewLimits, looking_at
+from ars_web.geometry.view_proposals import Proposals, Reason
 from ars_web.geometry.view_tour import nearest_neighbour_path, path_length, pose_distances
 from ars_web.sessions.model import FrameTable, ObjectClass, SessionSnapshot, SessionState, VirtualBox
+from ars_web.studies import tour as tour_study
 from ars_web.studies.tour import Tour, TourRequest, plan_tour
 from ars_web.studies.tour_json import tour_json, wrist_rows
 
@@ -218,3 +222,68 @@ def test_the_same_question_has_the_same_answer() -> None:
 def test_what_cannot_be_is_refused(request_: dict[str, Any], said: str) -> None:
     with pytest.raises(BadInput, match=re.escape(said)):
         planned(with_hole()[:10], [MUG], TourRequest(**{"bins": BINS, **request_}))
+
+
+def looking(eyes: list[tuple[float, float, float]]) -> np.ndarray:
+    """Cameras at these places about the mug's centre that look at it."""
+    centre = scene.things()[MUG].box.T_world_box[:3, 3]
+    return looking_at(centre + np.array(eyes), np.tile(centre, (len(eyes), 1)))
+
+
+def limits_of(Ts: np.ndarray, **given: Any) -> ViewLimits:
+    snapshot = session(Ts)
+    views = session_views(snapshot, TourRequest().options)
+    views = replace(views, counted=np.ones_like(views.counted))
+    return tour_study._limits(snapshot, views, [MUG], TourRequest(**given))
+
+
+def test_limits_taken_from_frames_stay_what_can_be() -> None:
+    # From 2 cm, straight above, to 3 m: a tenth of that less than 2 cm would be behind the object.
+    found = limits_of(looking([(0.0, 0.0, 0.02), (3.0, 0.0, 0.0)]))
+    assert found.distance == pytest.approx((0.01, 3.0 + 0.298))
+    assert found.tilt == pytest.approx((-tour_study.WIDENED_TILT, math.pi / 2))
+    up = limits_of(looking([(0.0, 0.0, -0.5), (0.5, 0.0, 0.0)]))
+    assert up.tilt == pytest.approx((-math.pi / 2, tour_study.WIDENED_TILT))
+    height = scene.things()[MUG].box.T_world_box[2, 3]
+    assert up.height == pytest.approx((height - 0.5 - 0.05, height + 0.05))
+    # What all frames have alike is widened by a hundredth of the distance.
+    alike = limits_of(looking([(0.5, 0.0, 0.0), (0.0, 0.5, 0.0)]))
+    assert alike.distance == pytest.approx((0.495, 0.505))
+    assert alike.height == pytest.approx((height - 0.005, height + 0.005))
+
+
+@pytest.mark.parametrize(("asked", "least"), [(None, 0.5), (0.0, 0.1), (0.05, 0.1), (0.6, 0.6)])
+def test_views_show_more_than_next_to_nothing(asked: float | None, least: float) -> None:
+    assert limits_of(looking([(0.5, 0.0, 0.2), (0.0, 0.5, 0.2)]), min_visible=asked).min_visible == least
+
+
+def test_the_usual_distance_is_tried_first_then_further_then_nearer() -> None:
+    snapshot = session(looking([(0.4, 0.0, 0.0), (0.0, 0.5, 0.0), (0.6, 0.0, 0.0)]))
+    views = session_views(snapshot, TourRequest().options)
+    views = replace(views, counted=np.ones_like(views.counted))
+    centre = scene.things()[MUG].box.T_world_box[:3, 3]
+
+    def tried(near: float, far: float) -> list[float]:
+        limits = ViewLimits((near, far), (-9.0, 9.0), (-1.0, 1.0))
+        return list(tour_study._distances(snapshot, views, MUG, centre, limits))
+
+    assert tried(0.3, 0.9) == pytest.approx([0.5, 0.7, 0.9, 0.4, 0.3])
+    assert tried(0.0, 0.5) == pytest.approx([0.5, 0.2525, 0.005])
+    assert tried(0.8, 0.8) == [0.8]
+    assert tried(0.7, 0.9) == pytest.approx([0.7, 0.8, 0.9])
+
+
+def test_distances_are_refused_only_where_nothing_else_is_at_fault() -> None:
+    request, limits = TourRequest(distance=(1.0, 2.0)), ViewLimits((1.0, 2.0), (-9.0, 9.0), (-1.0, 1.0))
+
+    def refuse(*reasons: Reason, asked: TourRequest = request) -> None:
+        left = tuple((0, cell, reason) for cell, reason in enumerate(reasons))
+        tour_study._refuse_nothing(Proposals((), left), asked, limits)
+
+    with pytest.raises(BadInput, match="every object is too small"):
+        refuse("small", "height", "near")
+    refuse("small", "hidden")
+    refuse("small", "large")
+    refuse("height", "tilt")
+    refuse("small", asked=TourRequest())
+    refuse()
