@@ -83,25 +83,18 @@ def comparison_warnings(
 
 def _shifts(offsets: Offsets) -> Iterator[str]:
     """Of both directions in which all rectangles seem moved, and of sides that only one convention would move."""
-    moved = False
     for first, second, way, back in (
         (offsets.left, offsets.right, "right", "left"),
         (offsets.top, offsets.bottom, "down", "up"),
     ):
         least = min(first, second, key=abs)
         if first * second > 0 and abs(least) >= SHIFT:
-            moved = True
             yield (
                 f"Automatic labels lie {abs((first + second) / 2):.1f} px further {way if least > 0 else back} than"
                 " manual ones, in the median: were the manual ones drawn on images of another size or crop, or do they"
                 " count pixels from another corner? If not, look at the poses."
             )
-    if (
-        not moved
-        and offsets.left >= SHIFT
-        and offsets.top >= SHIFT
-        and max(abs(offsets.right), abs(offsets.bottom)) < SHIFT
-    ):
+    if min(offsets.left, offsets.top) >= SHIFT > max(abs(offsets.right), abs(offsets.bottom)):
         yield (
             f"Manual labels begin {min(offsets.left, offsets.top):.1f} px further left and up, and end where automatic"
             " ones do: is it a VOC file that counts pixels from 0?"

@@ -21,7 +21,7 @@ from ars_web.geometry.camera import Camera
 from ars_web.geometry.polygon import Polygon
 from ars_web.sessions.model import FrameTable, ObjectClass, SessionSnapshot, SessionState, VirtualBox
 from ars_web.studies import comparison_pictures
-from ars_web.studies.agreement import Agreement, Confusion, Matches, Offsets, RectangleAgreement
+from ars_web.studies.agreement import Agreement, Confusion, Matches, Offsets, RectangleAgreement, rectangle_agreement
 from ars_web.studies.compared_frames import Sides
 from ars_web.studies.comparison import Comparison, compare
 from ars_web.studies.comparison_report import comparison_page, offset_rows
@@ -418,6 +418,17 @@ def test_a_share_on_a_band_s_border_belongs_to_the_better_seen_band() -> None:
     assert [band.matched for band in bands] == [2, 1, 1, 1]
     assert [band.in_image for band in bands] == pytest.approx([0.85, 0.7, 0.6, 0.5])
     assert [band.visible for band in bands] == [1.0] * 4
+
+
+def test_the_histogram_has_twenty_parts_of_one() -> None:
+    rows, ious = np.arange(5), np.array([0.3, 0.50001, 0.94999, 0.95001, 1.0])
+    rectangles = Rectangles(rows, np.zeros(5, dtype=np.int64), np.tile([0.0, 0.0, 4.0, 4.0], (5, 1)))
+    none = np.zeros(0, dtype=np.int64)
+    found = Matches(Pairs(rows, rows, ious), Pairs(none, none, np.zeros(0)))
+    told = rectangle_agreement(rectangles, rectangles, found, names=("cup",), compared=frozenset({0}))
+    assert [i for i, count in enumerate(told.histogram) for _ in range(count)][1:] == [10, 18, 19, 19]
+    assert sum(told.histogram) == 5
+    assert told.total.median_iou == 0.94999
 
 
 def offsets(left: float, top: float, right: float, bottom: float) -> list[str]:
