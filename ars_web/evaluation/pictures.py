@@ -55,7 +55,8 @@ def _picture(evaluation: Evaluation, detector: DetectorScore, mistakes: ImageMis
     try:
         pixels = read_reduced(image.file, width=WIDTH)
     except (BadFile, TooLarge) as error:
-        return Picture(image.name, mistakes, None, str(error))
+        # Reports are passed on: where the images lie is nobody's business.
+        return Picture(image.name, mistakes, None, str(error).replace(str(image.file), image.name))
     _draw(pixels, evaluation, detector, mistakes.image, pixels.shape[1] / image.size[0])
     encoded, jpeg = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
     if not encoded:

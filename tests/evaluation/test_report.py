@@ -112,3 +112,15 @@ def test_a_picture_that_is_not_there_says_so(tiny: Case) -> None:
     assert [(one.jpeg, one.why) for one in worst_pictures(evaluation, evaluation.detectors[0])] == [
         (None, "the image is not there")
     ]
+
+
+def test_a_picture_that_cannot_be_read_says_so_without_where_it_lies(photographed: Case, tmp_path: Path) -> None:
+    truth, found = photographed
+    broken = tmp_path / "0000.jpg"
+    broken.write_bytes(b"no image")
+    truth = replace(truth, images=tuple(replace(one, file=broken) for one in truth.images))
+    evaluation = evaluate(truth, [found], coco=False)
+    (worst,) = worst_pictures(evaluation, evaluation.detectors[0])
+    assert worst.jpeg is None
+    assert worst.why.startswith("0000.jpg: ")
+    assert str(tmp_path) not in worst.why
