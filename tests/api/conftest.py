@@ -45,7 +45,7 @@ class Server:
 
     def stranger(self, **headers: str) -> httpx.Client:
         """A client without a token."""
-        return httpx.Client(base_url=self.url, headers=headers, timeout=30)
+        return httpx.Client(base_url=self.url, headers=headers, timeout=120)
 
     def browser(self, **headers: str) -> httpx.Client:
         """A client with a login cookie, as a browser's page on this server sends it."""
@@ -54,7 +54,7 @@ class Server:
             base_url=self.url,
             cookies={door.cookie_name: door.cookies.issue()},
             headers={"Origin": self.url, "Sec-Fetch-Site": "same-origin", **headers},
-            timeout=30,
+            timeout=120,
         )
 
 
@@ -72,7 +72,7 @@ def write_scene(folder: Path, *, frames: int = 6) -> Path:
     return folder
 
 
-def until(condition: Callable[[], bool], *, seconds: float = 20.0) -> None:
+def until(condition: Callable[[], bool], *, seconds: float = 60.0) -> None:
     """Return once `condition` holds; fail after `seconds`."""
     deadline = time.monotonic() + seconds
     pause = threading.Event()
@@ -108,7 +108,7 @@ def run_server(
     try:
         until(lambda: server.started)
         url = f"http://127.0.0.1:{port}"
-        with httpx.Client(base_url=url, headers={"Authorization": f"Bearer {TOKEN}"}, timeout=30) as client:
+        with httpx.Client(base_url=url, headers={"Authorization": f"Bearer {TOKEN}"}, timeout=120) as client:
             yield Server(url, app, client, root)
     finally:
         app.state.services.events.close()

@@ -41,7 +41,7 @@ def browser() -> Iterator[Browser]:
     """The Chromium that ARS_WEB_CHROMIUM names, else the system's, else Playwright's own."""
     names = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
     system = next((path for name in names if (path := shutil.which(name))), None)
-    expect.set_options(timeout=30_000)  # what must come about is waited for, however busy the machine is
+    expect.set_options(timeout=60_000)  # what must come about is waited for, however busy the machine is
     with sync_playwright() as playwright:
         launched = playwright.chromium.launch(
             executable_path=os.environ.get("ARS_WEB_CHROMIUM") or system, args=FLAGS, headless=True

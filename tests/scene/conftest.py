@@ -68,7 +68,7 @@ class Visitor:
             )
         )
 
-    def listen_until(self, condition: Callable[["Visitor"], bool], *, seconds: float = 20.0) -> None:
+    def listen_until(self, condition: Callable[["Visitor"], bool], *, seconds: float = 60.0) -> None:
         """Take in messages until `condition(self)`."""
         deadline = time.monotonic() + seconds
         while not condition(self):
@@ -136,7 +136,7 @@ def visit() -> Callable[[SceneAddress], AbstractContextManager[Visitor]]:
     return visiting
 
 
-def until(condition: Callable[[], bool], *, seconds: float = 20.0) -> None:
+def until(condition: Callable[[], bool], *, seconds: float = 60.0) -> None:
     """Return once `condition` holds; fail after `seconds`."""
     deadline = time.monotonic() + seconds
     pause = threading.Event()

@@ -26,7 +26,7 @@ READY = """() => {
 }"""
 
 
-def wait_until(condition: Callable[[], Any], *, page: Page | None = None, seconds: float = 20.0) -> None:
+def wait_until(condition: Callable[[], Any], *, page: Page | None = None, seconds: float = 60.0) -> None:
     """Wait for a condition; with a `page`, its events are served meanwhile."""
     deadline, pause = time.monotonic() + seconds, threading.Event()
     while not condition():

@@ -69,7 +69,7 @@ class Workspace:
         self.until(lambda: any("/scene/" in frame.url for frame in self.page.frames))
         return next(frame for frame in self.page.frames if "/scene/" in frame.url)
 
-    def until(self, condition: Callable[[], Any], *, seconds: float = 20.0) -> None:
+    def until(self, condition: Callable[[], Any], *, seconds: float = 60.0) -> None:
         """Wait for a condition; the page goes on meanwhile."""
         deadline = time.monotonic() + seconds
         while not condition():
@@ -88,7 +88,7 @@ class Workspace:
 
     def saved(self, revision: int) -> None:
         """Wait until the page says that a revision is stored, and find that it is the server's."""
-        self.page.get_by_text(f"Saved, revision {revision}", exact=True).wait_for(timeout=20_000)
+        self.page.get_by_text(f"Saved, revision {revision}", exact=True).wait_for(timeout=60_000)
         assert self.revision() == revision
 
     def enter(self, frame: int) -> None:

@@ -77,7 +77,7 @@ def test_a_killed_server_comes_back_to_a_page_that_kept_what_was_typed(
         expect(saved).to_have_text("Not saved yet: reconnecting")
         assert page.get_by_role("spinbutton", name="Position X", exact=True).input_value() == "12.5"
         with same_again(sessions):
-            expect(saved).to_have_text("Saved, revision 1", timeout=20_000)
+            expect(saved).to_have_text("Saved, revision 1", timeout=60_000)
             assert workspace.box(mug_id)["T_world_box"]["position"][0] == pytest.approx(0.0125, abs=1e-12)
             assert len(edits(workspace)) == 1
 
@@ -111,7 +111,7 @@ def test_what_somebody_else_did_meanwhile_is_not_overwritten(open_workspace, sam
             )
         with same_again(sessions):
             card = workspace.page.get_by_role("region", name="Conflict", exact=True)
-            expect(card).to_be_visible(timeout=20_000)
+            expect(card).to_be_visible(timeout=60_000)
             assert workspace.box(mug_id)["T_world_box"]["position"] == changed.box.T_world_box[:3, 3].tolist()
             card.get_by_role("button", name="Use mine").click()
             workspace.until(lambda: workspace.revision() == 2)
@@ -156,7 +156,7 @@ def test_a_page_without_network_comes_back_with_it(open_workspace, mug) -> None:
             f"/api/sessions/{sid}/boxes/{mug_id - 1}", json={"name": "seen later"}, headers={"If-Match": '"0"'}
         )
         page.context.set_offline(False)
-        expect(saved).to_have_text("Saved, revision 2", timeout=20_000)
+        expect(saved).to_have_text("Saved, revision 2", timeout=60_000)
         expect(page.get_by_role("grid", name="Boxes").get_by_text("seen later", exact=True)).to_be_visible()
         assert workspace.box(mug_id)["T_world_box"]["position"][0] == pytest.approx(0.0125, abs=1e-12)
         assert len(edits(workspace)) == 2
@@ -182,7 +182,7 @@ def test_a_line_that_went_silent_is_given_up_and_made_anew(served, browser, mug)
             expect(saved).to_have_text("Not saved yet: reconnecting")
         finally:
             process.send_signal(signal.SIGCONT)
-        expect(saved).to_have_text("Saved, revision 1", timeout=20_000)
+        expect(saved).to_have_text("Saved, revision 1", timeout=60_000)
         headers = {"Authorization": f"Bearer {TOKEN}", "If-Match": '"1"'}
         with httpx.Client(base_url=f"{base}/api/sessions/{sid}", headers=headers, timeout=60) as client:
             history = client.get("/history").json()["items"]
