@@ -86,13 +86,15 @@ def _turns() -> list[Float[np.ndarray, "3 3"]]:
 
 _TURNS = _turns()
 
+_UP = np.array([[0.0, 0.0, 1.0]])
+
 _AXES_FIRST = [np.eye(3)[:, order] for order in ((0, 1, 2), (1, 2, 0), (2, 0, 1))]
 """Turns after which z is what z, x and y were."""
 
 
 def _smallest_box_rotation(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "3 3"]:
-    """The axes of the smallest box that is found with a side along a face of the convex hull, or along two of its
-    longest edges, and then by turning it about each axis in turn as long as it gets smaller.
+    """The axes of the smallest box that is found with a side along a face of the convex hull, along two of its longest
+    edges, or level, and then by turning it about each axis in turn as long as it gets smaller: no upright box is.
 
     (Every smallest box has two sides that meet and hold an edge each: O'Rourke 1985, who tries all pairs of edges.)
     A box with a side of a given normal is no smaller than the height along it times the area of what is seen along it,
@@ -100,7 +102,7 @@ def _smallest_box_rotation(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray
     """
     corners, normals, areas, edges = _convex_hull(points)
     best, smallest = np.eye(3), _volume(corners, np.eye(3))
-    along = _distinct(np.concatenate([normals, _normals_of_pairs(edges)]))
+    along = _distinct(np.concatenate([normals, _normals_of_pairs(edges), _UP]))
     heights = np.ptp(corners @ along.T, axis=0)
     bounds = heights * (np.abs(along @ normals.T) @ areas) / 2
     for i in np.argsort(bounds, kind="stable"):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from ars_web.geometry import rigid_transform
@@ -53,6 +53,7 @@ def test_the_box_holds_the_hull_whatever_the_order_of_its_vertices(seed: int, or
 
 @settings(max_examples=12)
 @given(seed=st.integers(0, 2**32 - 1))
+@example(seed=5408)  # none of whose faces and longest edges gives an axis as good as z
 def test_the_free_box_is_no_larger_than_others_find(seed: int):
     hull = lump(seed)
     free = box_of_hull(hull, orientation="free")
