@@ -16,9 +16,11 @@ from jaxtyping import install_import_hook
 from xdist.remote import Producer
 from xdist.scheduler import LoadFileScheduling
 
-# Property tests look at what is answered, not at how busy the machine is.
-settings.register_profile("untimed", deadline=None)
-settings.load_profile("untimed")
+# Property tests look at what is answered, not at how busy the machine is. They try the same cases every time, so that
+# what a change breaks is told from what was always so; `--hypothesis-profile=search` tries others on purpose.
+settings.register_profile("search", deadline=None)
+settings.register_profile("repeatable", settings.get_profile("search"), derandomize=True, database=None)
+settings.load_profile("repeatable")
 
 # Every annotated shape in geometry/ is checked while the tests run. Kernel modules hold numba code, which takes
 # no such wrapper.
