@@ -9,6 +9,7 @@ from ars_web.errors import BadFile, TooLarge
 from ars_web.evaluation.mistakes import ImageMistakes, images_by_mistakes
 from ars_web.evaluation.scores import DetectorScore, Evaluation
 from ars_web.recordings.images import read_reduced
+from ars_web.reporting.jpeg import jpeg
 
 WIDTH = 520
 """Pixels that a picture is wide at most."""
@@ -22,7 +23,6 @@ COLOURS = {
 """What is drawn, and how."""
 
 _FINE = 4
-_QUALITY = 82
 
 
 @dataclass(frozen=True)
@@ -58,10 +58,7 @@ def _picture(evaluation: Evaluation, detector: DetectorScore, mistakes: ImageMis
         # Reports are passed on: where the images lie is nobody's business.
         return Picture(image.name, mistakes, None, str(error).replace(str(image.file), image.name))
     _draw(pixels, evaluation, detector, mistakes.image, pixels.shape[1] / image.size[0])
-    encoded, jpeg = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
-    if not encoded:
-        return Picture(image.name, mistakes, None, "the picture cannot be encoded")
-    return Picture(image.name, mistakes, jpeg.tobytes())
+    return Picture(image.name, mistakes, jpeg(pixels))
 
 
 def _draw(pixels: np.ndarray, evaluation: Evaluation, detector: DetectorScore, image: int, scale: float) -> None:

@@ -54,8 +54,8 @@ def matched_images(
     A name is that of a frame, or else ends as one does, folders included, where only one frame ends so; endings of
     files may differ (`labels/left/1.txt` is `images/left/1.png`, and so is `1.jpg` where there is no second 1). Or
     else it is what exports make of a frame's name (`a/1.png` becomes `a_1`, and `SESSION_a_1` where they hold several
-    sessions; `session` is this one's id). Of several images that fit one frame
-    the one whose name shares the most folders with the frame's is it.
+    sessions; `session` is this one's id). Of several images that fit one frame the one whose name shares the most
+    folders with the frame's is it.
     A number is the digits in a frame's name, where every number has one frame; else it counts the frames from 0, where
     the file has as many images as the session has frames. Numbers of a video count the frames in the first place.
 

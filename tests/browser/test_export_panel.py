@@ -394,5 +394,10 @@ def test_the_report_is_of_the_options_that_are_set(boxed_session, open_flatly) -
             page.get_by_role("link", name="Report", exact=True).click()
         report = opened.value
         expect(report.get_by_text("--frames-step 2").first).to_be_visible(timeout=60_000)
+        report.close()
+        link, held = page.get_by_role("link", name="Report", exact=True), page.locator(".start [aria-disabled]")
         field(page, "Every N-th frame").fill("none")
-        expect(page.get_by_role("link", name="Report", exact=True)).to_have_count(0)
+        expect(link).to_have_count(0)
+        expect(held.get_by_text("Report")).to_have_attribute("title", re.compile("^Set right first"))
+        field(page, "Every N-th frame").fill("1")
+        expect(link).to_have_count(1)

@@ -22,6 +22,8 @@ const GROUPS = [
   { title: "Split", holder: "split", has: (/** @type {Option} */ { name }) => name.startsWith("split.") },
   { title: "Labels", holder: "labels", has: () => true },
 ];
+/** Of an address; servers on the way refuse longer ones. */
+const LONGEST_ADDRESS = 8000;
 const ORDER = ["frames", "choosing", "images", "labels", "split"];
 
 export function ExportPanel() {
@@ -74,11 +76,27 @@ function toWrong() {
   if (wrong instanceof HTMLElement) wrong.focus();
 }
 
+/** The way to the report of what would be written. @param {{held: boolean}} props */
+function Report({ held }) {
+  const address = actions.reportAddress(asked.value);
+  const why = held
+    ? "Set right first what is marked"
+    : asked.value.sessions !== undefined
+      ? "A report is of one session: take out those that are merged with it"
+      : address.length > LONGEST_ADDRESS
+        ? "So many single frames are more than an address holds: ars-web report takes them"
+        : null;
+  const face = html`<${Icon} name="clipboard-list" size=${14} />Report`;
+  if (why !== null) return html`<span class="button" aria-disabled="true" title=${why}>${face}</span>`;
+  return html`<a
+    class="button" href=${address} target="_blank" rel="noopener" title="What these options would write and what to mend first, on a page of its own"
+  >${face}</a>`;
+}
+
 function Start() {
   const starting = useSignal(false);
   const problem = useSignal(/** @type {string | null} */ (null));
   const held = !isSound.value || refusals.value.size > 0 || format.value === "";
-  const merges = asked.value.sessions !== undefined; // a report is of one session
   const frames = isCurrent.value ? forecast.value?.frames : undefined;
   const start = async () => {
     if (held) return toWrong();
@@ -100,10 +118,7 @@ function Start() {
     ${problem.value !== null && html`<p class="problem" role="alert">${problem.value}</p>`}
     <p class="visually-hidden" role="status">${going > 0 ? `${many(going, "export")} running` : "No export is running"}</p>
     <div class="row">
-      ${isSound.value &&
-      !merges &&
-      html`<a class="button" href=${actions.reportAddress(asked.value)} target="_blank" rel="noopener" title="What these options would write and what to mend first, on a page of its own">
-        <${Icon} name="clipboard-list" size=${14} />Report</a>`}
+      <${Report} held=${held} />
       <button class="button main" aria-disabled=${held || starting.value} onClick=${start}>
         ${starting.value ? "Starting…" : frames === undefined ? "Start export" : `Export ${many(frames, "frame")}`}
       </button>

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from playwright.sync_api import Route
+from playwright.sync_api import Route, expect
 from scipy.spatial.transform import Rotation
 
 MUG = "mug"
@@ -135,7 +135,8 @@ def test_an_answer_that_comes_late_takes_no_newer_problem_away(open_workspace, m
         for route, response in late:
             route.fulfill(response=response)
         workspace.saved(1)
-        page.get_by_text("is locked").first.wait_for()
+        page.wait_for_timeout(200)  # what the late answer brings is drawn by then
+        expect(page.get_by_text("is locked").first).to_be_visible(timeout=1)
 
 
 def _place(box) -> tuple:
