@@ -122,8 +122,14 @@ def whole_shards(partial: Path) -> list[Path]:
 def begun(partial: Path) -> bool:
     """Whether some shard holds some of its images, but not nearly all, and another is whole."""
     unfinished = (f for f in partial.glob("shards/?????*") if not (f / "shard.json").exists())
-    placed = (sum(1 for _ in folder.glob("files/images/**/*.jpg")) for folder in unfinished)
-    return len(whole_shards(partial)) >= 1 and any(2 <= n <= 6 for n in placed)
+    return len(whole_shards(partial)) >= 1 and any(2 <= images_in(folder) <= 6 for folder in unfinished)
+
+
+def images_in(shard: Path) -> int:
+    try:
+        return sum(1 for _ in shard.glob("files/images/**/*.jpg"))
+    except FileNotFoundError:
+        return 0  # it was put in its place, under another name, while it was looked at
 
 
 def workers_of(process: subprocess.Popen[str]) -> list[psutil.Process]:
